@@ -2,16 +2,18 @@
 
 Dead loads on a flexible link, those whose energy is linear in displacements, are replaced by their potential as the
 link moves rigidly, from their sum and moments. Other loads prefer no pose if they balance on each link, as pressure on
-a closed part does, and contact as long as nothing touches. The pose as drawn remains the start, and the log says so,
+a closed part does, and contact as long as nothing touches: no point meets an obstacle on a way that is shorter than its
+gap. The pose as drawn remains the start, and the log says so,
 where they do not on the way, loads drive the mechanism on without end, or no pose is found.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
@@ -152,22 +154,62 @@ class RestPoses:
             return RestPose(unloaded)
         if np.array_equal(turn.way[-1], unloaded.poses):
             return RestPose(unloaded, resist, reached)
-        states = [unloaded, *map(self._at, turn.way[1:])]
-        if (link := next((link for state in states if (link := self._disturbed(state))), None)) is not None:
-            _log.info("load steps start from the pose as drawn: on the way, %r meets loads that are not dead", link)
+        for met in self._met_on(turn.way):
+            _log.info("load steps start from the pose as drawn: on the way, %s", met)
             return RestPose(unloaded)
-        return RestPose(states[-1], resist, reached)
+        return RestPose(self._at(turn.way[-1]), resist, reached)
 
     def _at(self, poses: np.ndarray) -> State:
         rest = self._model.assembled_state(poses, self._unloaded.motors)
         return replace(self._unloaded, u=rest.u, poses=poses)
 
+    def _met_on(self, way: Sequence[np.ndarray]) -> Iterator[str]:
+        """What flexible links meet on the way between poses of all bodies."""
+        if self._model.elastic.effects_ufl is None:
+            return
+        for poses in way:
+            if link := self._disturbed(self._at(poses)):
+                yield f"{link!r} meets loads that are not dead"
+        for before, after in pairwise(way):
+            if self._system.surfaces and (link := self._obstructed(before, after)):
+                yield f"{link!r} meets an obstacle, or passes it closely"
+
+    def _obstructed(self, before: np.ndarray, after: np.ndarray) -> str | None:
+        """The first flexible link that may meet an obstacle on the way from poses of all bodies to others.
+
+        The way is bisected until each point's gaps at both ends are larger than its motion: spheres of these radii
+        around both ends, which are clear, then hold any way between them up to twice as long.
+        """
+        model, comm = self._model, self._model.mesh.mesh.comm
+        ends = zip(self._system.surfaces, self._gaps(before), self._gaps(after), strict=True)
+        near = next(
+            (
+                surface.link.name
+                for surface, (start, gaps), (end, others) in ends
+                if np.any(np.linalg.norm(end - start, axis=1) >= np.minimum(gaps, others))
+            ),
+            None,
+        )
+        near = next(filter(None, comm.allgather(near)), None)
+        if near is None:
+            return None
+        arguments = before, after, self._motors, model.spring_potentials
+        middle = from_one(comm, lambda: self._search.halfway(model.linkage.rigid, *arguments))
+        if middle is None:
+            return near
+        return self._obstructed(before, middle) or self._obstructed(middle, after)
+
+    def _gaps(self, poses: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each surface, this rank's points at the ``poses`` of all bodies, (n, dim), and their gaps, (n,)."""
+        self._model.load(self._at(poses))
+        for surface in self._system.surfaces:
+            surface.update()
+        return [(surface.places, surface.gaps) for surface in self._system.surfaces]
+
     def _disturbed(self, state: State) -> str | None:
         """The first flexible link on which loads that are not dead, of obstacles too, do not balance in a loaded
         ``state``."""
         model, dim = self._model, self._model.linkage.dim
-        if model.elastic.effects_ufl is None:
-            return None
         model.load(state)
         _, others = model.elastic.effect_loads()
         moved = state.u[: model.interfaces.owned * model.interfaces.block].reshape(model.interfaces.owned, -1)

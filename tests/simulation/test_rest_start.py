@@ -15,6 +15,7 @@ from fenicsmech.multibody import PosePotential
 
 LENGTH = 60.0
 WIDTH, DEPTH = 2.0, 5.0
+NEAR, CORNER = 0.95 * LENGTH, math.hypot(LENGTH, 0.5 * WIDTH)  # distances from the hinge
 
 
 def simulated(mechanism: fm.Mechanism, *effects: fm.Effect, comm: MPI.Comm = MPI.COMM_SELF) -> fm.Simulation:
@@ -222,12 +223,18 @@ def test_body_forces_without_a_sum_turn_a_rod_by_their_moments():
     assert frame.stable and not frame.snapped_through
 
 
+def beside(angle: float, radius: float, distance: float = NEAR) -> fm.Cylinder:
+    """A pin at a distance from the hinge, ``angle`` ahead of a rod that hangs straight down."""
+    return fm.Cylinder((distance * math.sin(angle), -distance * math.cos(angle)), radius)
+
+
 @pytest.mark.parametrize(
     "effect",
     [
         pytest.param(lambda rod: fm.Pressure(rod, 1e-3), id="pressure all round"),
         pytest.param(lambda rod: fm.Prestrain(rod, 1.001), id="prestrain"),
         pytest.param(lambda rod: fm.Contact(rod, fm.HalfPlane((0, 10), (0, -1))), id="obstacle out of reach"),
+        pytest.param(lambda rod: fm.Contact(rod, beside(0.7, 3.0, CORNER + 3.5)), id="pin that the rod just passes"),
     ],
 )
 def test_loads_that_prefer_no_pose_leave_that_to_the_force(effect):
@@ -237,15 +244,25 @@ def test_loads_that_prefer_no_pose_leave_that_to_the_force(effect):
     assert frame.stable and not frame.snapped_through
 
 
-def test_obstacle_on_the_way_keeps_the_pose_as_drawn_for_a_start_and_the_log_says_so(caplog):
-    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
+@pytest.mark.parametrize(
+    ("obstacle", "touching"),
+    [
+        # the angle at which the rod's side, or for the wall its end's corner, touches
+        pytest.param(beside(0.7, 3.0), 0.7 - math.asin((3.0 + 0.5 * WIDTH) / NEAR), id="pin"),
+        pytest.param(
+            beside(0.8, 1.0), 0.8 - math.asin((1.0 + 0.5 * WIDTH) / NEAR), id="thin pin", marks=pytest.mark.thorough
+        ),
+        pytest.param(
+            fm.HalfPlane((20, 0), (-1, 0)), math.asin(20.0 / CORNER) - math.atan(0.5 * WIDTH / LENGTH), id="wall"
+        ),
+    ],
+)
+def test_rod_stops_at_an_obstacle_on_its_way_and_the_log_says_why_it_starts_as_drawn(obstacle, touching, caplog):
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, obstacle))
     with caplog.at_level(logging.INFO, logger="fenicsmech"):
-        try:
-            frames = simulation.load_displacement(pull, forces=[1e-2]).frames
-        except fm.EquilibriumError as error:
-            frames = error.frames
+        (frame,) = simulation.load_displacement(pull, forces=[1e-2]).frames
     assert "start from the pose as drawn" in caplog.text and "'rod' meets" in caplog.text
-    assert all(frame.displacement < 22.0 for frame in frames)
+    assert frame.displacement == pytest.approx(LENGTH * math.sin(touching), rel=5e-3)
 
 
 def test_path_until_a_force_begins_at_a_part_of_it_and_is_the_only_one_that_is_set_up(monkeypatch):
