@@ -36,11 +36,13 @@ class RestPose:
     Attributes:
         state: the equilibrium there.
         loads_resist: whether loads resist all zero-energy modes there, once they are not zero.
-        reached: whether a prescribed displacement is reached there, without force.
+        short: prescribed displacement that is beyond that there; 0 where it is reached, without force.
+        reached: whether one is prescribed and reached.
     """
 
     state: State
     loads_resist: bool = False
+    short: float = 0.0
     reached: bool = False
 
 
@@ -110,7 +112,7 @@ class RestPoses:
         self._model, self._system, self._unloaded, self._motors = model, system, unloaded, motors
         self._others, self._search = dict(constant), search or RestSearch()
         self._ratios = dict(part.ratios) if isinstance(part, Force | ForceGroup) else {}
-        self._found: dict[tuple[bool, float], RestPose] = {}
+        self._last: tuple[bool, float, RestPose] | None = None  # what was wanted, and the pose
 
     def under(self, control: Control) -> RestPose:
         """The pose that constant loads prefer, and the controlled force as it starts from zero, by its sign.
@@ -120,10 +122,14 @@ class RestPoses:
         wanted = control.prescribed
         if not control.constrained:
             wanted = math.copysign(1.0, wanted) if wanted else 0.0
-        key = control.constrained, wanted
-        if key not in self._found:
-            self._found[key] = self._turned(*key)
-        return self._found[key]
+        if self._last is not None:
+            constrained, before, rest = self._last
+            # beyond one that is out of reach, displacements pull from the same pose
+            if constrained == control.constrained and (wanted == before or rest.short * (wanted - before) > 0.0):
+                return rest
+        rest = self._turned(control.constrained, wanted)
+        self._last = control.constrained, wanted, rest
+        return rest
 
     def same(self, a: RestPose, b: RestPose) -> bool:
         """Whether steps under load that start from one may start from the other as well."""
@@ -143,21 +149,22 @@ class RestPoses:
         def search():
             turn = self._search.pose(rigid, unloaded.poses, self._motors, levels)
             free = count_freedom(rigid, turn.way[-1], self._motors, loads, self._system.idle).zero_energy
-            near = self._search.near * model.linkage.length
-            return turn, not free, constrained and abs(spring.short(turn.way[-1])) <= near
+            near, short = self._search.near * model.linkage.length, spring.short(turn.way[-1])
+            return turn, not free, short if constrained and abs(short) > near else 0.0
 
         # of one process: decisions that depend on rounding are the same on all
-        turn, resist, reached = from_one(model.mesh.mesh.comm, search)
+        turn, resist, short = from_one(model.mesh.mesh.comm, search)
+        reached = constrained and not short
         if turn.ending is not RestEnding.AT_REST:
             unsettled = turn.ending is RestEnding.NOT_CONVERGED
             (_log.warning if unsettled else _log.info)("load steps start from the pose as drawn: %s", turn.ending.value)
             return RestPose(unloaded)
         if np.array_equal(turn.way[-1], unloaded.poses):
-            return RestPose(unloaded, resist, reached)
+            return RestPose(unloaded, resist, short, reached)
         for met in self._met_on(turn.way):
             _log.info("load steps start from the pose as drawn: on the way, %s", met)
             return RestPose(unloaded)
-        return RestPose(self._at(turn.way[-1]), resist, reached)
+        return RestPose(self._at(turn.way[-1]), resist, short, reached)
 
     def _at(self, poses: np.ndarray) -> State:
         rest = self._model.assembled_state(poses, self._unloaded.motors)
@@ -165,9 +172,7 @@ class RestPoses:
 
     def _met_on(self, way: Sequence[np.ndarray]) -> Iterator[str]:
         """What flexible links meet on the way between poses of all bodies."""
-        if self._model.elastic.effects_ufl is None:
-            return
-        for poses in way:
+        for poses in way if self._model.elastic.has_other_than_dead_loads else ():
             if link := self._disturbed(self._at(poses)):
                 yield f"{link!r} meets loads that are not dead"
         for before, after in pairwise(way):

@@ -11,7 +11,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.continuation import ArcLengthStepper
 from fenicsmech.equilibrium import EquilibriumSolver
-from fenicsmech.multibody import PosePotential
+from fenicsmech.multibody import PosePotential, RestSearch
 
 LENGTH = 60.0
 WIDTH, DEPTH = 2.0, 5.0
@@ -138,6 +138,22 @@ def test_force_that_returns_to_zero_and_changes_sign_pulls_the_rod_to_the_other_
     assert opposite == pytest.approx(-there, rel=1e-9)
     assert curve.stable.all() and not curve.snapped_through.any()
     assert max(frame.iterations for frame in curve.frames) <= 5
+
+
+def test_displacements_beyond_reach_pull_from_one_pose_that_is_found_once(monkeypatch):
+    sought, search = [], RestSearch.pose
+
+    def counted(self, *given):
+        sought.append(search(self, *given))
+        return sought[-1]
+
+    monkeypatch.setattr(RestSearch, "pose", counted)
+    simulation, pull = pendulum((1, 0))
+    displacements = [1.001 * LENGTH, 1.002 * LENGTH, -1.001 * LENGTH, -1.002 * LENGTH]
+    curve = simulation.load_displacement(pull, displacements=displacements)
+    assert len(sought) == 2
+    assert curve.forces[2:] == pytest.approx(-curve.forces[:2], rel=1e-6)
+    assert curve.stable.all()
 
 
 def test_displacements_that_return_into_free_reach_need_no_force_again():
