@@ -34,7 +34,7 @@ class RestEnding(Enum):
 
     AT_REST = "a pose was found"
     DRIVEN_ON = "loads drive the mechanism on without end"
-    NOT_CONVERGED = "no pose was found in the steps allowed"
+    NOT_CONVERGED = "no pose at rest was found in the steps allowed"
 
 
 @dataclass(frozen=True, eq=False)

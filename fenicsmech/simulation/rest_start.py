@@ -3,12 +3,13 @@
 Dead loads on a flexible link, those whose energy is linear in displacements, are replaced by their potential as the
 link moves rigidly, from their sum and moments. Other loads prefer no pose if they balance on each link, as pressure on
 a closed part does, and contact as long as nothing touches: no point meets an obstacle on a way that is shorter than its
-gap. The pose as drawn remains the start, and the log says so,
-where they do not on the way, loads drive the mechanism on without end, or no pose is found.
+gap. The pose as drawn remains the start, and the log says so, where they do not on the way; the last start does where
+loads drive the mechanism on without end, or no pose is found.
 """
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -77,13 +78,11 @@ class CurveStart:
         rest: the pose without loads.
         state: the equilibrium there under constant loads.
         steps: load steps from there.
-        effort: on the way to the state.
     """
 
     rest: RestPose
     state: State
     steps: LoadStepper
-    effort: Effort
 
 
 class RestPoses:
@@ -96,7 +95,7 @@ class RestPoses:
         motors: of the linkage with rigid links, (connections,).
         constant: other forces and their magnitudes, which act as effects do.
         part: the controlled force, or motors.
-        search: for the poses.
+        where: the part and the configuration, for messages.
     """
 
     def __init__(
@@ -107,17 +106,17 @@ class RestPoses:
         motors: np.ndarray,
         constant: Iterable[tuple[Force, float]],
         part: PrescribedPart,
-        search: RestSearch | None = None,
+        where: str,
     ) -> None:
         self._model, self._system, self._unloaded, self._motors = model, system, unloaded, motors
-        self._others, self._search = dict(constant), search or RestSearch()
+        self._others, self._where, self._search = dict(constant), where, RestSearch()
         self._ratios = dict(part.ratios) if isinstance(part, Force | ForceGroup) else {}
-        self._last: tuple[bool, float, RestPose] | None = None  # what was wanted, and the pose
+        self._last: tuple[bool, float, RestPose | None] | None = None  # what was wanted, and the pose
 
-    def under(self, control: Control) -> RestPose:
+    def under(self, control: Control) -> RestPose | None:
         """The pose that constant loads prefer, and the controlled force as it starts from zero, by its sign.
 
-        Where a displacement is prescribed, from the drawing, it is the pose nearest to it.
+        Where a displacement is prescribed, from the drawing, it is the pose nearest to it. None if none is found.
         """
         wanted = control.prescribed
         if not control.constrained:
@@ -125,7 +124,9 @@ class RestPoses:
         if self._last is not None:
             constrained, before, rest = self._last
             # beyond one that is out of reach, displacements pull from the same pose
-            if constrained == control.constrained and (wanted == before or rest.short * (wanted - before) > 0.0):
+            if constrained == control.constrained and (
+                wanted == before or (rest is not None and rest.short * (wanted - before) > 0.0)
+            ):
                 return rest
         rest = self._turned(control.constrained, wanted)
         self._last = control.constrained, wanted, rest
@@ -139,7 +140,7 @@ class RestPoses:
         apart = from_one(self._model.mesh.mesh.comm, lambda: self._search.distance(rigid, *poses))
         return apart <= self._search.same
 
-    def _turned(self, constrained: bool, wanted: float) -> RestPose:
+    def _turned(self, constrained: bool, wanted: float) -> RestPose | None:
         model, rigid, unloaded = self._model, self._model.linkage.rigid, self._unloaded
         spring = TravelSpring([*self._dead(self._ratios)], wanted)
         weak: list[PosePotential] = [spring] if constrained else [*self._dead(self._ratios, wanted)]
@@ -156,13 +157,22 @@ class RestPoses:
         turn, resist, short = from_one(model.mesh.mesh.comm, search)
         reached = constrained and not short
         if turn.ending is not RestEnding.AT_REST:
+            value = f"displacement {spring.short(unloaded.poses):g}" if constrained else f"forces of sign {wanted:g}"
             unsettled = turn.ending is RestEnding.NOT_CONVERGED
-            (_log.warning if unsettled else _log.info)("load steps start from the pose as drawn: %s", turn.ending.value)
-            return RestPose(unloaded)
+            _log.log(
+                logging.WARNING if unsettled else logging.INFO,
+                "%s, %s: %s%s; load steps start where the last ones did, or as drawn. "
+                "Draw it nearer to rest, or add a spring",
+                self._where,
+                value,
+                turn.ending.value,
+                f" ({self._search.steps} steps)" if unsettled else "",
+            )
+            return None
         if np.array_equal(turn.way[-1], unloaded.poses):
             return RestPose(unloaded, resist, short, reached)
         for met in self._met_on(turn.way):
-            _log.info("load steps start from the pose as drawn: on the way, %s", met)
+            _log.info("%s: load steps start from the pose as drawn: on the way, %s", self._where, met)
             return RestPose(unloaded)
         return RestPose(self._at(turn.way[-1]), resist, short, reached)
 

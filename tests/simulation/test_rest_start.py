@@ -2,16 +2,17 @@
 
 import logging
 import math
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.continuation import ArcLengthStepper
+from fenicsmech.continuation import ArcLengthStepper, LoadStepper
 from fenicsmech.equilibrium import EquilibriumSolver
-from fenicsmech.multibody import PosePotential, RestSearch
+from fenicsmech.multibody import PosePotential, RestEnding, RestSearch
 
 LENGTH = 60.0
 WIDTH, DEPTH = 2.0, 5.0
@@ -156,6 +157,29 @@ def test_displacements_beyond_reach_pull_from_one_pose_that_is_found_once(monkey
     assert curve.stable.all()
 
 
+def test_search_that_finds_no_pose_keeps_the_last_start_and_says_what_to_do(monkeypatch, caplog):
+    simulation, pull = pendulum((1, 0))
+    search, started, set_up = RestSearch.pose, [], LoadStepper.__init__
+
+    def failing(self, *given):
+        turn = search(self, *given)
+        return replace(turn, ending=RestEnding.NOT_CONVERGED) if started else turn
+
+    def counted(self, *given, **options):
+        started.append(self)
+        set_up(self, *given, **options)
+
+    monkeypatch.setattr(RestSearch, "pose", failing)
+    monkeypatch.setattr(LoadStepper, "__init__", counted)
+    curve = simulation.load_displacement(pull, displacements=[1.001 * LENGTH, 1.0005 * LENGTH])
+    assert len(started) == 1
+    assert curve.forces[0] == pytest.approx(2.0 * curve.forces[1], rel=1e-2)
+    assert curve.stable.all()
+    (message,) = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
+    assert "'pull' in configuration 'as drawn', displacement 60.03" in message and "200 steps" in message
+    assert "Draw it nearer to rest, or add a spring" in message
+
+
 def test_displacements_that_return_into_free_reach_need_no_force_again():
     simulation, pull = pendulum((1, 0))
     curve = simulation.load_displacement(pull, displacements=[1.001 * LENGTH, 0.5 * LENGTH])
@@ -163,18 +187,55 @@ def test_displacements_that_return_into_free_reach_need_no_force_again():
     assert abs(curve.forces[1]) < 1e-9 and curve.frames[1].stable
 
 
-def test_iterations_and_time_of_constant_loads_are_those_of_the_frame_that_they_lead_to(monkeypatch):
-    solved, solve = [], EquilibriumSolver.solve
+@pytest.fixture
+def solved(monkeypatch):
+    """Equilibria as they are solved."""
+    points, solve = [], EquilibriumSolver.solve
 
     def counted(self, start, control):
-        solved.append(solve(self, start, control))
-        return solved[-1]
+        points.append(solve(self, start, control))
+        return points[-1]
 
     monkeypatch.setattr(EquilibriumSolver, "solve", counted)
+    return points
+
+
+def test_iterations_of_constant_loads_are_those_of_the_frame_that_they_lead_to(solved):
     simulation, pull = pendulum((1, 0), fm.Gravity((9810.0, 0.0)))
     frames = simulation.load_displacement(pull, forces=[0.0, 0.01]).frames
     assert sum(frame.iterations for frame in frames) == sum(point.iterations for point in solved)
     assert len(solved) > 3  # load steps of the weight, the settled start, and one of each force
+
+
+def test_iterations_of_motors_that_wind_up_springs_are_those_of_the_first_frame(solved):
+    mechanism = fm.Mechanism("wound rod")
+    base, crank = mechanism.rigid("base", fixed=True), mechanism.rigid("crank")
+    rod = mechanism.flexible("rod", fm.strip([(20, 0), (60, 0)], thickness=WIDTH, depth=DEPTH), fm.ONYX)
+    motor = mechanism.motor(mechanism.revolute(base, crank, at=(0, 0)))
+    elbow = mechanism.revolute(crank, rod, at=(20, 0), interface_radius=1.0)
+    pull = mechanism.force(on=rod, at=(60, 0), direction=(0, 1), name="pull")
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(elbow, 1e3)])
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
+    turned = scene.configuration("turned", {motor: 0.5})
+    frames = simulation.load_displacement(pull, forces=[0.0, 0.1], configuration=turned).frames
+    assert sum(frame.iterations for frame in frames) == sum(point.iterations for point in solved)
+    assert len(solved) > 3  # steps of the motor as well
+
+
+def test_time_of_the_search_for_a_pose_is_that_of_the_frame_that_it_leads_to(monkeypatch):
+    search = RestSearch.pose
+
+    def slow(self, *given):
+        time.sleep(1.0)
+        return search(self, *given)
+
+    simulation, pull = pendulum((1, 0))
+    began = time.perf_counter()
+    monkeypatch.setattr(RestSearch, "pose", slow)
+    frames = simulation.load_displacement(pull, forces=[1e-3, -1e-3]).frames
+    whole = time.perf_counter() - began
+    assert all(frame.seconds > 1.0 for frame in frames)
+    assert sum(frame.seconds for frame in frames) < whole
 
 
 class Tripwire(PosePotential):
