@@ -133,6 +133,11 @@ class EquilibriumSystem:
         return PredictedStress(self.elastic)
 
     @property
+    def ideal_compliance(self) -> float:
+        """Displacement per force that counts as none: 1e-8 of the mean, that of ideal joints."""
+        return 1e-6 * self.joints.length / self.unknowns.unit**2
+
+    @property
     def rigid_rows(self) -> np.ndarray:
         """Constraints without compliance, (n,)."""
         return np.flatnonzero(self.compliances == 0.0)

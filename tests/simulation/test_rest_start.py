@@ -354,3 +354,26 @@ def test_path_until_a_force_begins_at_a_part_of_it_and_is_the_only_one_that_is_s
     curve = simulation.follow(pull, until=fm.Until(force=2.0), steps=fm.ArcSteps(first_load=0.05))
     assert curve.forces[:2] == pytest.approx([0.0, 0.1]) and curve.forces[-1] == pytest.approx(2.0)
     assert len(made) == 1
+
+
+def test_path_beyond_the_travel_of_a_rigid_pendulum_says_that_it_ends():
+    mechanism = fm.Mechanism("rigid pendulum")
+    base, rod = mechanism.rigid("base", fixed=True), mechanism.rigid("rod")
+    flag = mechanism.flexible("flag", fm.strip([(0, -LENGTH), (10, -LENGTH)], thickness=WIDTH, depth=DEPTH), fm.ONYX)
+    mechanism.revolute(base, rod, at=(0, 0))
+    mechanism.weld(rod, flag, at=(0, -LENGTH), interface_radius=1.0)
+    pull = mechanism.force(on=rod, at=(0, -LENGTH), direction=(1, 0), name="pull")
+    simulation = simulated(mechanism)
+    for end in (fm.Until(displacement=2.0 * LENGTH), fm.Until(displacement=2.0 * LENGTH, force=1e3)):
+        with pytest.raises(fm.EquilibriumError, match="moves nothing beyond displacement 60, where travel ends"):
+            simulation.follow(pull, until=end)
+    reached = simulation.follow(pull, until=fm.Until(displacement=LENGTH))
+    assert reached.displacements[-1] == pytest.approx(LENGTH)  # a dead centre: any force is in equilibrium there
+
+
+def test_path_of_a_rod_that_meets_a_wall_on_its_way_ends_there():
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
+    followed = simulation.follow(pull, until=fm.Until(force=1e-2))
+    touching = math.asin(20.0 / CORNER) - math.atan(0.5 * WIDTH / LENGTH)
+    assert followed.forces[-1] == pytest.approx(1e-2)
+    assert followed.displacements[-1] == pytest.approx(LENGTH * math.sin(touching), rel=5e-3)
