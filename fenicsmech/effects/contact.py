@@ -46,7 +46,10 @@ class Obstacle(ABC):
 
     @abstractmethod
     def gap(self, x, numbers, sqrt):
-        """g at the coordinates ``x``, two or three, with ``numbers`` and ``sqrt``: of NumPy, UFL or SymPy."""
+        """g at the coordinates ``x``, two or three, with ``numbers`` and ``sqrt``: of NumPy, UFL or SymPy.
+
+        No point is nearer to the surface than |g|.
+        """
 
     @property
     def core(self) -> float | None:
@@ -157,9 +160,9 @@ class Contact(Effect):
     Penetration falls as 1 / stiffness; iterations hardly depend on it. Obstacles act only after the motors have moved:
     a configuration whose rigid assembly is on the far side of an obstacle stays there. From then on flexible links
     cannot slip through a cylinder: states with a penetration of a quarter of its radius are rejected. Mechanisms that
-    nothing but loads holds start as drawn where an obstacle is on the way to the pose that loads prefer. In space a
-    pressed edge is also pressed on its flat faces inside the obstacle, with an error of the order of penetration over
-    depth.
+    nothing but loads holds start as drawn where an obstacle is on the way of a flexible link to the pose that loads
+    prefer. In space a pressed edge is also pressed on its flat faces inside the obstacle, with an error of the order of
+    penetration over depth.
 
     Raises:
         DescriptionError: a number is invalid, or a field that a link of this kind needs is missing.
@@ -245,7 +248,8 @@ class OneSided:
         link: with the boundary.
         compliances: 1/κ, (n,).
         weights: areas that points stand for, of the links at rest, their depth included, (n,).
-        gaps: g, (n,), as ``weights`` of the last ``update``.
+        places: x, (n, dim), as ``weights`` and ``gaps`` of the last ``update``.
+        gaps: g, (n,).
     """
 
     def __init__(self, contact: Contact, link: FlexibleLink, fields: LinkFields) -> None:
@@ -293,10 +297,10 @@ class OneSided:
             self._take_rest()
             self._rest = shape.copy(), depth.copy()
         self._u = u.copy()
-        self._places = self._unloaded + self._nodes @ u.reshape(-1, body.model.dim)
+        self.places = self._unloaded + self._nodes @ u.reshape(-1, body.model.dim)
         numbers = np.array([self._obstacle.numbers])
-        self.gaps = self._gap.value(self._places, numbers)[:, 0]
-        self._normals = self._gap.gradient(self._places, numbers)[:, 0]
+        self.gaps = self._gap.value(self.places, numbers)[:, 0]
+        self._normals = self._gap.gradient(self.places, numbers)[:, 0]
 
     def _take_rest(self) -> None:
         """Places and weights of the points in the rest shape."""
@@ -340,7 +344,7 @@ class OneSided:
         if not count:
             return
         blocks = stiffness[points, None, None] * normals[:, :, None] * normals[:, None, :]
-        curvatures = self._gap.hessian(self._places[points], np.array([self._obstacle.numbers]), np.ones((count, 1)))
+        curvatures = self._gap.hessian(self.places[points], np.array([self._obstacle.numbers]), np.ones((count, 1)))
         blocks = self.weights[points, None, None] * (blocks - pressures[points, None, None] * curvatures)
         shape = self._nodes[points]
         used = np.unique(shape.indices)

@@ -220,6 +220,11 @@ class ElasticBody(BodyFields):
             part[:] = assemble_vector(form, work)
         return found
 
+    @property
+    def has_other_than_dead_loads(self) -> bool:
+        """Whether loads of effects change with u."""
+        return self._effect_load_forms[1] is not None
+
     def effect_loads(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodal forces of effects at load factor 1: of dead loads, and of others, which change with u.
 

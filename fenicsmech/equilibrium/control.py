@@ -149,8 +149,8 @@ class LoadControl(Control):
         return system.load_displacement(state)
 
     def moves(self, system, tangent: Step) -> bool:
-        """Whether the force moves its point; a compliance of 1e-8 of the mean, that of ideal joints, counts as zero."""
-        return system.size(tangent) > 1e-6 * system.joints.length / system.unknowns.unit**2
+        """Whether the force moves its point."""
+        return system.size(tangent) > system.ideal_compliance
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,8 @@ class EquilibriumSystem:
         blocks: of the unknowns.
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
-        contact: the points of one-sided constraints; None without them.
+        surfaces: of ``one_sided``.
+        contact: the points of these; None without them.
     """
 
     def __init__(
@@ -105,7 +106,7 @@ class EquilibriumSystem:
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
-        self.idle, self.potentials = tuple(idle), tuple(potentials)
+        self.idle, self.potentials, self.surfaces = tuple(idle), tuple(potentials), tuple(one_sided)
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
             elastic, joints, numbering, controlled, loads, potentials=potentials, compliances=self.compliances
@@ -123,6 +124,11 @@ class EquilibriumSystem:
     @cached_property
     def _predicted_stress(self) -> PredictedStress:
         return PredictedStress(self.elastic)
+
+    @property
+    def ideal_compliance(self) -> float:
+        """Displacement per force that counts as none: 1e-8 of the mean, that of ideal joints."""
+        return 1e-6 * self.joints.length / self.unknowns.unit**2
 
     @property
     def rigid_rows(self) -> np.ndarray:

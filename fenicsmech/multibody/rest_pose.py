@@ -34,7 +34,7 @@ class RestEnding(Enum):
 
     AT_REST = "a pose was found"
     DRIVEN_ON = "loads drive the mechanism on without end"
-    NOT_CONVERGED = "no pose was found in the steps allowed"
+    NOT_CONVERGED = "no pose at rest was found in the steps allowed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +62,7 @@ class RestSearch:
         reach: distance from the given pose beyond which loads drive the mechanism on without end.
         same: largest distance between two poses that count as one.
         balanced: resultants of loads that turn with their link, over the sizes of these loads, that count as none.
+        clear: distance between two poses below which their way is not examined further for obstacles.
 
     Raises:
         DescriptionError: a number is not positive, or that of steps not whole.
@@ -73,6 +74,7 @@ class RestSearch:
     reach: float = 30.0
     same: float = 1e-6
     balanced: float = 1e-9
+    clear: float = 1e-3
 
     def __post_init__(self) -> None:
         set_options(self, "the search for a pose at rest", steps=1)
@@ -101,6 +103,22 @@ class RestSearch:
         """The largest change of a coordinate between two poses of all bodies, (bodies, pose_size)."""
         change = (system.unknowns(b) - system.unknowns(a)) / system.pose_scale
         return float(np.max(np.abs(change), initial=0.0))
+
+    def halfway(
+        self,
+        system: JointSystem,
+        before: np.ndarray,
+        after: np.ndarray,
+        motors: np.ndarray,
+        springs: Sequence[PosePotential],
+    ) -> np.ndarray | None:
+        """A closed assembly between two, nearer to each than they are to each other; None where they are near already,
+        or none is found."""
+        apart, assembler = self.distance(system, before, after), Assembler(system, springs)
+        middle = 0.5 * (system.unknowns(before) + system.unknowns(after))
+        found, missed = assembler.relax(*assembler.close(system.with_unknowns(before, middle), motors), motors)
+        strayed = max(self.distance(system, before, found), self.distance(system, found, after)) >= apart
+        return None if apart <= self.clear or strayed or not assembler.is_closed(missed) else found
 
     def _descend(
         self, assembler: Assembler, way: list[np.ndarray], motors: np.ndarray, level: Sequence[PosePotential]

@@ -243,7 +243,7 @@ class CurveFollower:
 
     def _within(self, travel: float) -> tuple[float, ...]:
         """The wanted displacements that the point reaches without a force, which moves freely as far as ``travel``."""
-        return tuple(end for end in self._until.displacements if end * travel > 0.0 and abs(end) < abs(travel))
+        return tuple(end for end in self._until.displacements if end * travel > 0.0 and abs(end) <= abs(travel))
 
     def _moved_freely(self, ends: Sequence[float], watch: Callable[[int], None]) -> FollowedCurve:
         """The curve on which nothing resists, until the first of ``ends``."""
@@ -257,7 +257,11 @@ class CurveFollower:
         reach, conjugate = self._changes(state)
         if conjugate:
             point = equilibrium_at(self._stepper.solver, self._followed, state)
-            reach = linear_reach(point, value=reach, conjugate=conjugate)
+            # of the point itself: rounding turns what nothing holds yet
+            moves = abs(point.conjugate_rate) > self._system.ideal_compliance
+            reach = linear_reach(point, value=reach, conjugate=conjugate) if moves else 0.0
+        if not 0.0 < reach < math.inf:
+            raise NotConverged(f"it moves nothing beyond displacement {self._conjugate(state):g}, where travel ends")
         return self._stepper.frame(LoadControl(math.copysign(self._steps.first_load * reach, self._sense())))
 
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:

@@ -2,16 +2,19 @@
 
 Dead loads on a flexible link, those whose energy is linear in displacements, are replaced by their potential as the
 link moves rigidly, from their sum and moments. Other loads prefer no pose if they balance on each link, as pressure on
-a closed part does, and contact as long as nothing touches. The pose as drawn remains the start, and the log says so,
-where they do not on the way, loads drive the mechanism on without end, or no pose is found.
+a closed part does, and contact as long as nothing touches: no point meets an obstacle on a way that is shorter than its
+gap. The pose as drawn remains the start, and the log says so, where they do not on the way; the last start does where
+loads drive the mechanism on without end, or no pose is found.
 """
 
 from __future__ import annotations
 
+import logging
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
@@ -34,11 +37,13 @@ class RestPose:
     Attributes:
         state: the equilibrium there.
         loads_resist: whether loads resist all zero-energy modes there, once they are not zero.
-        reached: whether a prescribed displacement is reached there, without force.
+        short: prescribed displacement that is beyond that there; 0 where it is reached, without force.
+        reached: whether one is prescribed and reached.
     """
 
     state: State
     loads_resist: bool = False
+    short: float = 0.0
     reached: bool = False
 
 
@@ -73,13 +78,11 @@ class CurveStart:
         rest: the pose without loads.
         state: the equilibrium there under constant loads.
         steps: load steps from there.
-        effort: on the way to the state.
     """
 
     rest: RestPose
     state: State
     steps: LoadStepper
-    effort: Effort
 
 
 class RestPoses:
@@ -92,7 +95,7 @@ class RestPoses:
         motors: of the linkage with rigid links, (connections,).
         constant: other forces and their magnitudes, which act as effects do.
         part: the controlled force, or motors.
-        search: for the poses.
+        where: the part and the configuration, for messages.
     """
 
     def __init__(
@@ -103,25 +106,31 @@ class RestPoses:
         motors: np.ndarray,
         constant: Iterable[tuple[Force, float]],
         part: PrescribedPart,
-        search: RestSearch | None = None,
+        where: str,
     ) -> None:
         self._model, self._system, self._unloaded, self._motors = model, system, unloaded, motors
-        self._others, self._search = dict(constant), search or RestSearch()
+        self._others, self._where, self._search = dict(constant), where, RestSearch()
         self._ratios = dict(part.ratios) if isinstance(part, Force | ForceGroup) else {}
-        self._found: dict[tuple[bool, float], RestPose] = {}
+        self._last: tuple[bool, float, RestPose | None] | None = None  # what was wanted, and the pose
 
-    def under(self, control: Control) -> RestPose:
+    def under(self, control: Control) -> RestPose | None:
         """The pose that constant loads prefer, and the controlled force as it starts from zero, by its sign.
 
-        Where a displacement is prescribed, from the drawing, it is the pose nearest to it.
+        Where a displacement is prescribed, from the drawing, it is the pose nearest to it. None if none is found.
         """
         wanted = control.prescribed
         if not control.constrained:
             wanted = math.copysign(1.0, wanted) if wanted else 0.0
-        key = control.constrained, wanted
-        if key not in self._found:
-            self._found[key] = self._turned(*key)
-        return self._found[key]
+        if self._last is not None:
+            constrained, before, rest = self._last
+            # beyond one that is out of reach, displacements pull from the same pose
+            if constrained == control.constrained and (
+                wanted == before or (rest is not None and rest.short * (wanted - before) > 0.0)
+            ):
+                return rest
+        rest = self._turned(control.constrained, wanted)
+        self._last = control.constrained, wanted, rest
+        return rest
 
     def same(self, a: RestPose, b: RestPose) -> bool:
         """Whether steps under load that start from one may start from the other as well."""
@@ -131,7 +140,7 @@ class RestPoses:
         apart = from_one(self._model.mesh.mesh.comm, lambda: self._search.distance(rigid, *poses))
         return apart <= self._search.same
 
-    def _turned(self, constrained: bool, wanted: float) -> RestPose:
+    def _turned(self, constrained: bool, wanted: float) -> RestPose | None:
         model, rigid, unloaded = self._model, self._model.linkage.rigid, self._unloaded
         spring = TravelSpring([*self._dead(self._ratios)], wanted)
         weak: list[PosePotential] = [spring] if constrained else [*self._dead(self._ratios, wanted)]
@@ -141,33 +150,81 @@ class RestPoses:
         def search():
             turn = self._search.pose(rigid, unloaded.poses, self._motors, levels)
             free = count_freedom(rigid, turn.way[-1], self._motors, loads, self._system.idle).zero_energy
-            near = self._search.near * model.linkage.length
-            return turn, not free, constrained and abs(spring.short(turn.way[-1])) <= near
+            near, short = self._search.near * model.linkage.length, spring.short(turn.way[-1])
+            return turn, not free, short if constrained and abs(short) > near else 0.0
 
         # of one process: decisions that depend on rounding are the same on all
-        turn, resist, reached = from_one(model.mesh.mesh.comm, search)
+        turn, resist, short = from_one(model.mesh.mesh.comm, search)
+        reached = constrained and not short
         if turn.ending is not RestEnding.AT_REST:
+            value = f"displacement {spring.short(unloaded.poses):g}" if constrained else f"forces of sign {wanted:g}"
             unsettled = turn.ending is RestEnding.NOT_CONVERGED
-            (_log.warning if unsettled else _log.info)("load steps start from the pose as drawn: %s", turn.ending.value)
-            return RestPose(unloaded)
+            _log.log(
+                logging.WARNING if unsettled else logging.INFO,
+                "%s, %s: %s%s; load steps start where the last ones did, or as drawn. "
+                "Draw it nearer to rest, or add a spring",
+                self._where,
+                value,
+                turn.ending.value,
+                f" ({self._search.steps} steps)" if unsettled else "",
+            )
+            return None
         if np.array_equal(turn.way[-1], unloaded.poses):
-            return RestPose(unloaded, resist, reached)
-        states = [unloaded, *map(self._at, turn.way[1:])]
-        if (link := next((link for state in states if (link := self._disturbed(state))), None)) is not None:
-            _log.info("load steps start from the pose as drawn: on the way, %r meets loads that are not dead", link)
+            return RestPose(unloaded, resist, short, reached)
+        for met in self._met_on(turn.way):
+            _log.info("%s: load steps start from the pose as drawn: on the way, %s", self._where, met)
             return RestPose(unloaded)
-        return RestPose(states[-1], resist, reached)
+        return RestPose(self._at(turn.way[-1]), resist, short, reached)
 
     def _at(self, poses: np.ndarray) -> State:
         rest = self._model.assembled_state(poses, self._unloaded.motors)
         return replace(self._unloaded, u=rest.u, poses=poses)
 
+    def _met_on(self, way: Sequence[np.ndarray]) -> Iterator[str]:
+        """What flexible links meet on the way between poses of all bodies."""
+        for poses in way if self._model.elastic.has_other_than_dead_loads else ():
+            if link := self._disturbed(self._at(poses)):
+                yield f"{link!r} meets loads that are not dead"
+        for before, after in pairwise(way):
+            if self._system.surfaces and (link := self._obstructed(before, after)):
+                yield f"{link!r} meets an obstacle, or passes it closely"
+
+    def _obstructed(self, before: np.ndarray, after: np.ndarray) -> str | None:
+        """The first flexible link that may meet an obstacle on the way from poses of all bodies to others.
+
+        The way is bisected until each point's gaps at both ends are larger than its motion: spheres of these radii
+        around both ends, which are clear, then hold any way between them up to twice as long.
+        """
+        model, comm = self._model, self._model.mesh.mesh.comm
+        ends = zip(self._system.surfaces, self._gaps(before), self._gaps(after), strict=True)
+        near = next(
+            (
+                surface.link.name
+                for surface, (start, gaps), (end, others) in ends
+                if np.any(np.linalg.norm(end - start, axis=1) >= np.minimum(gaps, others))
+            ),
+            None,
+        )
+        near = next(filter(None, comm.allgather(near)), None)
+        if near is None:
+            return None
+        arguments = before, after, self._motors, model.spring_potentials
+        middle = from_one(comm, lambda: self._search.halfway(model.linkage.rigid, *arguments))
+        if middle is None:
+            return near
+        return self._obstructed(before, middle) or self._obstructed(middle, after)
+
+    def _gaps(self, poses: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each surface, this rank's points at the ``poses`` of all bodies, (n, dim), and their gaps, (n,)."""
+        self._model.load(self._at(poses))
+        for surface in self._system.surfaces:
+            surface.update()
+        return [(surface.places, surface.gaps) for surface in self._system.surfaces]
+
     def _disturbed(self, state: State) -> str | None:
         """The first flexible link on which loads that are not dead, of obstacles too, do not balance in a loaded
         ``state``."""
         model, dim = self._model, self._model.linkage.dim
-        if model.elastic.effects_ufl is None:
-            return None
         model.load(state)
         _, others = model.elastic.effect_loads()
         moved = state.u[: model.interfaces.owned * model.interfaces.block].reshape(model.interfaces.owned, -1)

@@ -159,42 +159,47 @@ class CurveStepper:
         self.followed = discretisation.followed_control(request.part)
         self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
         self._poses, self._rigid_motors = assembly.poses, motors
-        state, self._motor_snaps = self._unloaded(assembly)
-        self.unloaded = state
+        self._effort = Effort()  # on the way to the next frame
+        with self._timed():
+            self.unloaded = state = self._unloaded(assembly)
         self.adrift = bool(self.freedom.zero_energy) and not state.has_reactions
-        self._rest_poses = RestPoses(model, self._system, state, motors, request.others, request.part)
+        self._rest_poses = RestPoses(model, self._system, state, motors, request.others, request.part, request.where)
         self._start: CurveStart | None = None  # of the last load steps
-        self._framed: CurveStart | None = None  # of the last frame
         self._system.load(state)
         if not self.followed.displaces:  # motors count from where they were drawn
             self.origin = agreed(comm, self.followed.conjugate(self._system, state))
         self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
 
     def start(self, control: Control) -> CurveStart:
-        """Where load steps to ``control`` start: the present start, unless loads prefer another pose than its own.
+        """Where load steps to ``control`` start: the present start, unless loads are found to prefer another pose.
 
         Forces of one sign prefer one pose, a force of zero prefers none, and displacements that are reached without
         force have a pose each.
         """
         present, loaded = self._start, control.constrained or control.prescribed
         if present is None or (self.adrift and loaded):
-            rest = self._rest_poses.under(control) if self.adrift else RestPose(self.unloaded)
-            if present is None or not self._rest_poses.same(rest, present.rest):
-                self._start = present = self._started(rest, control)
+            with self._timed():
+                rest = self._rest_poses.under(control) if self.adrift else None
+                if present is None or (rest is not None and not self._rest_poses.same(rest, present.rest)):
+                    self._start = present = self._started(rest or RestPose(self.unloaded), control)
         return present
 
     def _started(self, rest: RestPose, control: Control) -> CurveStart:
-        clock = self._model.clock
-        began, seconds = perf_counter(), dict(clock.seconds)
-        state, steps = self._under_constant_loads(rest.state)
+        state = self._under_constant_loads(rest.state)
         self._system.load(state)
         shifts = LoadSteps().least_shifts(state.minimum_shift, loads_resist=rest.loads_resist and not rest.reached)
         kind = DisplacementControl() if control.constrained else LoadControl()
         predictor = self.discretisation.predictor
         stepper = LoadStepper(self.solver, state, kind, predictor=predictor, shifts=shifts)
-        counts = (steps.iterations, steps.snaps) if steps else (0, 0)
-        effort = Effort(*counts, perf_counter() - began, clock.since(seconds))
-        return CurveStart(rest, state, stepper, effort)
+        return CurveStart(rest, state, stepper)
+
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        """A context whose time counts as that of the next frame."""
+        clock = self._model.clock
+        began, seconds = perf_counter(), dict(clock.seconds)
+        yield
+        self._effort += Effort(seconds=perf_counter() - began, phases=clock.since(seconds))
 
     def curve(self, watch: Callable[[int], None]) -> Curve:
         """The frames of all prescribed values; ``watch`` is called with the number of frames so far."""
@@ -217,25 +222,23 @@ class CurveStepper:
         """The equilibrium under ``control``."""
         if control.constrained:
             control = control.at(control.prescribed + self.origin)
-        start, clock = self.start(control), self._model.clock
-        steps, effort = start.steps, Effort() if start is self._framed else start.effort
-        if not self.frames:
-            effort += Effort(snaps=self._motor_snaps)
-        began, seconds, iterations, snaps = perf_counter(), dict(clock.seconds), steps.iterations, steps.snaps
-        try:
-            with self.keeping_frames():
-                point = steps.advance(control)
-        except LoadStepsFailed as failure:
-            raise self._unreached(control, failure) from failure
-        record = self.record(point)
-        if self.freedom.mobility and not control.constrained and self._imbalance(point.state, control) > 1e-4:
-            names = ", ".join(map(repr, self.freedom.mobile))
-            problem = (
-                f"the rest position of {names} at force {control.prescribed:g} is lost in the rounding of stiff links"
-            )
-            raise self.error(self.request.where, problem, self.frames[-1] if self.frames else None)
-        spent = Effort(steps.iterations - iterations, steps.snaps - snaps, perf_counter() - began, clock.since(seconds))
-        self._framed, effort = start, effort + spent
+        steps = self.start(control).steps
+        iterations, snaps = steps.iterations, steps.snaps
+        with self._timed():
+            try:
+                with self.keeping_frames():
+                    point = steps.advance(control)
+            except LoadStepsFailed as failure:
+                raise self._unreached(control, failure) from failure
+            record = self.record(point)
+            if self.freedom.mobility and not control.constrained and self._imbalance(point.state, control) > 1e-4:
+                names = ", ".join(map(repr, self.freedom.mobile))
+                lost = (
+                    f"rest position of {names} at force {control.prescribed:g} is lost in the rounding of stiff links"
+                )
+                raise self.error(self.request.where, f"the {lost}", self.frames[-1] if self.frames else None)
+        effort = self._effort + Effort(steps.iterations - iterations, steps.snaps - snaps)
+        self._effort = Effort()
         return replace(
             record,
             snapped_through=effort.snaps > 0,
@@ -283,8 +286,8 @@ class CurveStepper:
                 design=model.design,
             )
 
-    def _unloaded(self, assembly: Assembly) -> tuple[State, int]:
-        """The equilibrium without forces, effects at load factor 0, and how often motors snapped on the way.
+    def _unloaded(self, assembly: Assembly) -> State:
+        """The equilibrium without forces, effects at load factor 0.
 
         It is the rigid assembly unless motors strain links, or wind up springs that do.
         """
@@ -298,7 +301,7 @@ class CurveStepper:
         )
         wound = bool(self._model.spring_potentials) and not np.array_equal(drawn, there)
         if fraction == 1.0 and not wound:
-            return state, 0
+            return state
         control = MotorControl(fraction, there - drawn, origin=drawn)
         stepper = DeadCentreStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
@@ -315,19 +318,19 @@ class CurveStepper:
                 "Choose motor positions nearer to the drawn ones, or a softer link or spring",
                 last=self._last(failure),
             ) from failure
-        return state, stepper.snaps
+        self._effort += Effort(stepper.iterations, stepper.snaps)
+        return state
 
-    def _under_constant_loads(self, state: State) -> tuple[State, LoadStepper | None]:
-        """The configuration under the request's constant forces and the scene's effects, which grow together, and the
-        steps that led there, if any."""
+    def _under_constant_loads(self, state: State) -> State:
+        """The configuration under the request's constant forces and the scene's effects, which grow together."""
         if not (self.request.others or self._model.effects):
-            return state, None
+            return state
         control = LoadFactorControl()
         start, predictor = control.prepare(state), self.discretisation.predictor
         stepper = DeadCentreStepper(self.solver, start, control, predictor=predictor)
         try:
             with self.keeping_frames():
-                return stepper.advance(control.at(1.0)).state, stepper
+                state = stepper.advance(control.at(1.0)).state
         except LoadStepsFailed as failure:
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
@@ -337,6 +340,8 @@ class CurveStepper:
                 self._last(failure),
                 otherwise="Choose smaller ones",
             ) from failure
+        self._effort += Effort(stepper.iterations, stepper.snaps)
+        return state
 
     # -- failures ----------------------------------------------------------------------------------------------
 

@@ -2,19 +2,21 @@
 
 import logging
 import math
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.continuation import ArcLengthStepper
+from fenicsmech.continuation import ArcLengthStepper, LoadStepper
 from fenicsmech.equilibrium import EquilibriumSolver
-from fenicsmech.multibody import PosePotential
+from fenicsmech.multibody import PosePotential, RestEnding, RestSearch
 
 LENGTH = 60.0
 WIDTH, DEPTH = 2.0, 5.0
+NEAR, CORNER = 0.95 * LENGTH, math.hypot(LENGTH, 0.5 * WIDTH)  # distances from the hinge
 
 
 def simulated(mechanism: fm.Mechanism, *effects: fm.Effect, comm: MPI.Comm = MPI.COMM_SELF) -> fm.Simulation:
@@ -139,6 +141,45 @@ def test_force_that_returns_to_zero_and_changes_sign_pulls_the_rod_to_the_other_
     assert max(frame.iterations for frame in curve.frames) <= 5
 
 
+def test_displacements_beyond_reach_pull_from_one_pose_that_is_found_once(monkeypatch):
+    sought, search = [], RestSearch.pose
+
+    def counted(self, *given):
+        sought.append(search(self, *given))
+        return sought[-1]
+
+    monkeypatch.setattr(RestSearch, "pose", counted)
+    simulation, pull = pendulum((1, 0))
+    displacements = [1.001 * LENGTH, 1.002 * LENGTH, -1.001 * LENGTH, -1.002 * LENGTH]
+    curve = simulation.load_displacement(pull, displacements=displacements)
+    assert len(sought) == 2
+    assert curve.forces[2:] == pytest.approx(-curve.forces[:2], rel=1e-6)
+    assert curve.stable.all()
+
+
+def test_search_that_finds_no_pose_keeps_the_last_start_and_says_what_to_do(monkeypatch, caplog):
+    simulation, pull = pendulum((1, 0))
+    search, started, set_up = RestSearch.pose, [], LoadStepper.__init__
+
+    def failing(self, *given):
+        turn = search(self, *given)
+        return replace(turn, ending=RestEnding.NOT_CONVERGED) if started else turn
+
+    def counted(self, *given, **options):
+        started.append(self)
+        set_up(self, *given, **options)
+
+    monkeypatch.setattr(RestSearch, "pose", failing)
+    monkeypatch.setattr(LoadStepper, "__init__", counted)
+    curve = simulation.load_displacement(pull, displacements=[1.001 * LENGTH, 1.0005 * LENGTH])
+    assert len(started) == 1
+    assert curve.forces[0] == pytest.approx(2.0 * curve.forces[1], rel=1e-2)
+    assert curve.stable.all()
+    (message,) = [record.getMessage() for record in caplog.records if record.levelno == logging.WARNING]
+    assert "'pull' in configuration 'as drawn', displacement 60.03" in message and "200 steps" in message
+    assert "Draw it nearer to rest, or add a spring" in message
+
+
 def test_displacements_that_return_into_free_reach_need_no_force_again():
     simulation, pull = pendulum((1, 0))
     curve = simulation.load_displacement(pull, displacements=[1.001 * LENGTH, 0.5 * LENGTH])
@@ -146,18 +187,55 @@ def test_displacements_that_return_into_free_reach_need_no_force_again():
     assert abs(curve.forces[1]) < 1e-9 and curve.frames[1].stable
 
 
-def test_iterations_and_time_of_constant_loads_are_those_of_the_frame_that_they_lead_to(monkeypatch):
-    solved, solve = [], EquilibriumSolver.solve
+@pytest.fixture
+def solved(monkeypatch):
+    """Equilibria as they are solved."""
+    points, solve = [], EquilibriumSolver.solve
 
     def counted(self, start, control):
-        solved.append(solve(self, start, control))
-        return solved[-1]
+        points.append(solve(self, start, control))
+        return points[-1]
 
     monkeypatch.setattr(EquilibriumSolver, "solve", counted)
+    return points
+
+
+def test_iterations_of_constant_loads_are_those_of_the_frame_that_they_lead_to(solved):
     simulation, pull = pendulum((1, 0), fm.Gravity((9810.0, 0.0)))
     frames = simulation.load_displacement(pull, forces=[0.0, 0.01]).frames
     assert sum(frame.iterations for frame in frames) == sum(point.iterations for point in solved)
     assert len(solved) > 3  # load steps of the weight, the settled start, and one of each force
+
+
+def test_iterations_of_motors_that_wind_up_springs_are_those_of_the_first_frame(solved):
+    mechanism = fm.Mechanism("wound rod")
+    base, crank = mechanism.rigid("base", fixed=True), mechanism.rigid("crank")
+    rod = mechanism.flexible("rod", fm.strip([(20, 0), (60, 0)], thickness=WIDTH, depth=DEPTH), fm.ONYX)
+    motor = mechanism.motor(mechanism.revolute(base, crank, at=(0, 0)))
+    elbow = mechanism.revolute(crank, rod, at=(20, 0), interface_radius=1.0)
+    pull = mechanism.force(on=rod, at=(60, 0), direction=(0, 1), name="pull")
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(elbow, 1e3)])
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
+    turned = scene.configuration("turned", {motor: 0.5})
+    frames = simulation.load_displacement(pull, forces=[0.0, 0.1], configuration=turned).frames
+    assert sum(frame.iterations for frame in frames) == sum(point.iterations for point in solved)
+    assert len(solved) > 3  # steps of the motor as well
+
+
+def test_time_of_the_search_for_a_pose_is_that_of_the_frame_that_it_leads_to(monkeypatch):
+    search = RestSearch.pose
+
+    def slow(self, *given):
+        time.sleep(1.0)
+        return search(self, *given)
+
+    simulation, pull = pendulum((1, 0))
+    began = time.perf_counter()
+    monkeypatch.setattr(RestSearch, "pose", slow)
+    frames = simulation.load_displacement(pull, forces=[1e-3, -1e-3]).frames
+    whole = time.perf_counter() - began
+    assert all(frame.seconds > 1.0 for frame in frames)
+    assert sum(frame.seconds for frame in frames) < whole
 
 
 class Tripwire(PosePotential):
@@ -222,12 +300,18 @@ def test_body_forces_without_a_sum_turn_a_rod_by_their_moments():
     assert frame.stable and not frame.snapped_through
 
 
+def beside(angle: float, radius: float, distance: float = NEAR) -> fm.Cylinder:
+    """A pin at a distance from the hinge, ``angle`` ahead of a rod that hangs straight down."""
+    return fm.Cylinder((distance * math.sin(angle), -distance * math.cos(angle)), radius)
+
+
 @pytest.mark.parametrize(
     "effect",
     [
         pytest.param(lambda rod: fm.Pressure(rod, 1e-3), id="pressure all round"),
         pytest.param(lambda rod: fm.Prestrain(rod, 1.001), id="prestrain"),
         pytest.param(lambda rod: fm.Contact(rod, fm.HalfPlane((0, 10), (0, -1))), id="obstacle out of reach"),
+        pytest.param(lambda rod: fm.Contact(rod, beside(0.7, 3.0, CORNER + 3.5)), id="pin that the rod just passes"),
     ],
 )
 def test_loads_that_prefer_no_pose_leave_that_to_the_force(effect):
@@ -237,15 +321,25 @@ def test_loads_that_prefer_no_pose_leave_that_to_the_force(effect):
     assert frame.stable and not frame.snapped_through
 
 
-def test_obstacle_on_the_way_keeps_the_pose_as_drawn_for_a_start_and_the_log_says_so(caplog):
-    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
+@pytest.mark.parametrize(
+    ("obstacle", "touching"),
+    [
+        # the angle at which the rod's side, or for the wall its end's corner, touches
+        pytest.param(beside(0.7, 3.0), 0.7 - math.asin((3.0 + 0.5 * WIDTH) / NEAR), id="pin"),
+        pytest.param(
+            beside(0.8, 1.0), 0.8 - math.asin((1.0 + 0.5 * WIDTH) / NEAR), id="thin pin", marks=pytest.mark.thorough
+        ),
+        pytest.param(
+            fm.HalfPlane((20, 0), (-1, 0)), math.asin(20.0 / CORNER) - math.atan(0.5 * WIDTH / LENGTH), id="wall"
+        ),
+    ],
+)
+def test_rod_stops_at_an_obstacle_on_its_way_and_the_log_says_why_it_starts_as_drawn(obstacle, touching, caplog):
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, obstacle))
     with caplog.at_level(logging.INFO, logger="fenicsmech"):
-        try:
-            frames = simulation.load_displacement(pull, forces=[1e-2]).frames
-        except fm.EquilibriumError as error:
-            frames = error.frames
+        (frame,) = simulation.load_displacement(pull, forces=[1e-2]).frames
     assert "start from the pose as drawn" in caplog.text and "'rod' meets" in caplog.text
-    assert all(frame.displacement < 22.0 for frame in frames)
+    assert frame.displacement == pytest.approx(LENGTH * math.sin(touching), rel=5e-3)
 
 
 def test_path_until_a_force_begins_at_a_part_of_it_and_is_the_only_one_that_is_set_up(monkeypatch):
@@ -260,3 +354,26 @@ def test_path_until_a_force_begins_at_a_part_of_it_and_is_the_only_one_that_is_s
     curve = simulation.follow(pull, until=fm.Until(force=2.0), steps=fm.ArcSteps(first_load=0.05))
     assert curve.forces[:2] == pytest.approx([0.0, 0.1]) and curve.forces[-1] == pytest.approx(2.0)
     assert len(made) == 1
+
+
+def test_path_beyond_the_travel_of_a_rigid_pendulum_says_that_it_ends():
+    mechanism = fm.Mechanism("rigid pendulum")
+    base, rod = mechanism.rigid("base", fixed=True), mechanism.rigid("rod")
+    flag = mechanism.flexible("flag", fm.strip([(0, -LENGTH), (10, -LENGTH)], thickness=WIDTH, depth=DEPTH), fm.ONYX)
+    mechanism.revolute(base, rod, at=(0, 0))
+    mechanism.weld(rod, flag, at=(0, -LENGTH), interface_radius=1.0)
+    pull = mechanism.force(on=rod, at=(0, -LENGTH), direction=(1, 0), name="pull")
+    simulation = simulated(mechanism)
+    for end in (fm.Until(displacement=2.0 * LENGTH), fm.Until(displacement=2.0 * LENGTH, force=1e3)):
+        with pytest.raises(fm.EquilibriumError, match="moves nothing beyond displacement 60, where travel ends"):
+            simulation.follow(pull, until=end)
+    reached = simulation.follow(pull, until=fm.Until(displacement=LENGTH))
+    assert reached.displacements[-1] == pytest.approx(LENGTH)  # a dead centre: any force is in equilibrium there
+
+
+def test_path_of_a_rod_that_meets_a_wall_on_its_way_ends_there():
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
+    followed = simulation.follow(pull, until=fm.Until(force=1e-2))
+    touching = math.asin(20.0 / CORNER) - math.atan(0.5 * WIDTH / LENGTH)
+    assert followed.forces[-1] == pytest.approx(1e-2)
+    assert followed.displacements[-1] == pytest.approx(LENGTH * math.sin(touching), rel=5e-3)
