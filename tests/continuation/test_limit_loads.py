@@ -48,6 +48,9 @@ class OneFreedom:
     def independent(self, step: Step) -> Step:
         return step
 
+    def touching(self, state: State) -> np.ndarray:
+        return np.zeros(0, bool)
+
     def moved(self, state: State, step: Step) -> State:
         return State(state.u + step.u, state.poses, state.multipliers, state.force + step.force, state.motors)
 
