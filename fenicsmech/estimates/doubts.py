@@ -112,8 +112,10 @@ def examined(
         step = options.step * error * slope / size if 0.0 < size < math.inf else 0.0
         reasons = []
         if step != 0.0:
-            there = _slope_at(solver, equilibrium, solver.system.moved(equilibrium.state, tangent.scaled(step)))
-            solver.system.load(equilibrium.state)
+            try:
+                there = _slope_at(solver, equilibrium, solver.system.moved(equilibrium.state, tangent.scaled(step)))
+            finally:
+                solver.system.load(equilibrium.state)
             if not math.isfinite(there):
                 reasons.append(_NO_TANGENT)
             elif abs((there - slope) * slope) > options.step * options.turn * size:

@@ -98,6 +98,27 @@ def test_solvers_that_stall_near_an_equilibrium_are_a_reason_of_their_own(monkey
     assert curve.doubts() == (("tangent not defined",),)
 
 
+def test_failure_beside_an_equilibrium_leaves_the_fields_at_it(monkeypatch):
+    scene, push, load = cantilever()
+    simulation = fm.Simulation(scene, space="plane-stress", size=3.0)
+    curve = simulation.load_displacement(push, forces=[load])
+    linearise, taken = EquilibriumSolver.linearise, []
+
+    def interrupted(self, *arguments, **options):
+        taken.append(linearise(self, *arguments, **options))
+        if len(taken) == 2:
+            raise KeyboardInterrupt
+        return taken[-1]
+
+    monkeypatch.setattr(EquilibriumSolver, "linearise", interrupted)
+    u = simulation.model.elastic.u.x.array
+    simulation.model.load(curve.frames[0].state)
+    there = u.copy()
+    with pytest.raises(KeyboardInterrupt):
+        curve.doubts()
+    assert (u == there).all()
+
+
 def test_doubts_make_two_factorisations_a_frame_and_keep_the_estimates():
     scene, push, load = cantilever()
     simulation = fm.Simulation(scene, space="plane-stress", size=3.0)

@@ -371,9 +371,23 @@ def test_path_beyond_the_travel_of_a_rigid_pendulum_says_that_it_ends():
     assert reached.displacements[-1] == pytest.approx(LENGTH)  # a dead centre: any force is in equilibrium there
 
 
-def test_path_of_a_rod_that_meets_a_wall_on_its_way_ends_there():
+@pytest.mark.parallel
+def test_rod_stops_at_a_wall_that_the_points_of_some_ranks_meet():
+    wall = fm.HalfPlane((20, 0), (-1, 0))
+    shared, alone = (
+        pendulum((1, 0), lambda rod: fm.Contact(rod, wall), comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+    )
+    (frame,), (same,) = (
+        simulation.load_displacement(pull, forces=[1e-2]).frames for simulation, pull in (shared, alone)
+    )
+    assert frame.displacement == pytest.approx(same.displacement, rel=1e-8)
+
+
+@pytest.mark.parametrize("end", [fm.Until(force=1e-2), fm.Until(displacement=19.15)], ids=["force", "displacement"])
+def test_path_of_a_rod_that_meets_a_wall_on_its_way_starts_there(end):
     simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
-    followed = simulation.follow(pull, until=fm.Until(force=1e-2))
+    followed = simulation.follow(pull, until=end)
     touching = math.asin(20.0 / CORNER) - math.atan(0.5 * WIDTH / LENGTH)
-    assert followed.forces[-1] == pytest.approx(1e-2)
-    assert followed.displacements[-1] == pytest.approx(LENGTH * math.sin(touching), rel=5e-3)
+    assert followed.displacements[1] == pytest.approx(LENGTH * math.sin(touching), rel=5e-3)
+    assert (followed.forces[-1] == pytest.approx(1e-2)) if end.force else (followed.displacements[-1] > 19.149)
+    assert followed.stable.all() and followed.events == ()
