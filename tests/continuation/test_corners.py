@@ -32,7 +32,7 @@ class Plate:
     until: float = math.inf
     modes: tuple[int, ...] = (0, 0)
     lost: float = math.inf
-    potentials, comm = (), MPI.COMM_SELF
+    potentials, comm, ideal_compliance = (), MPI.COMM_SELF, 0.0
 
     def __post_init__(self) -> None:
         self.system = self.contact = self
