@@ -23,7 +23,7 @@ from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.equilibrium.two_level import BySize
 from fenicsmech.errors import counted, expect, set_options
 
-_ELEMENT = 5e-3  # size over the mechanism's length: F = I + ∇u is rounded as if links moved by as much
+_STRETCHED = 5e-3  # motion over the mechanism's length, about an element's size, that rounds u as F = I + ∇u is
 _NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
 _ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
 _STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
@@ -36,7 +36,8 @@ class EquilibriumMethod(ABC):
     Attributes:
         tolerance: residual over the forces that balance in it, at convergence.
         roundoff: residual in units of mean stiffness times the largest displacement (rotations: times length) below
-            which digits are lost; of mean stiffness times length where the KKT matrix is nearly singular.
+            which digits are lost, at least 5e-3 of the length where effects load links; of mean stiffness times length
+            where the KKT matrix is nearly singular.
         linear: method for the linear systems; by default chosen by their size.
 
     Raises:
@@ -213,8 +214,10 @@ class EquilibriumSolver(ABC):
         )
 
     def _rounding(self, residual: Residual) -> float:
-        """Rounding of displacements and rotations, which are counted from the drawn configuration, and of F.
+        """Rounding of displacements and rotations, which are counted from the drawn configuration.
 
-        That of F = I + ∇u is all where loads balance on each link, as pressure and prestrain do: no forces are left.
+        Less than ``_NO_MOTION`` of the mechanism's length counts as no displacement. Where effects load links, that of
+        F = I + ∇u counts as well: it is all that is left of loads that balance on each link, as pressure does.
         """
-        return self.options.roundoff * self.system.unknowns.unit * max(residual.motion, _ELEMENT)
+        least = _NO_MOTION if self.system.elastic.effects_ufl is None else _STRETCHED
+        return self.options.roundoff * self.system.unknowns.unit * max(residual.motion, least)

@@ -127,7 +127,7 @@ class EquilibriumSystem:
 
     @property
     def ideal_compliance(self) -> float:
-        """Displacement per force that counts as none: 1e-8 of the mean, that of ideal joints."""
+        """Displacement per force that counts as none, over the mechanism's length: that of ideal joints."""
         return 1e-6 * self.joints.length / self.unknowns.unit**2
 
     @property

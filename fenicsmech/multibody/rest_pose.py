@@ -112,13 +112,13 @@ class RestSearch:
         motors: np.ndarray,
         springs: Sequence[PosePotential],
     ) -> np.ndarray | None:
-        """A closed assembly between two, nearer to each than they are to each other; None where they are near already,
-        or none is found."""
+        """A closed assembly between two, nearer to each by a quarter than they are to each other; None if none is
+        found."""
         apart, assembler = self.distance(system, before, after), Assembler(system, springs)
         middle = 0.5 * (system.unknowns(before) + system.unknowns(after))
         found, missed = assembler.relax(*assembler.close(system.with_unknowns(before, middle), motors), motors)
-        strayed = max(self.distance(system, before, found), self.distance(system, found, after)) >= apart
-        return None if apart <= self.clear or strayed or not assembler.is_closed(missed) else found
+        strayed = max(self.distance(system, before, found), self.distance(system, found, after)) > 0.75 * apart
+        return None if strayed or not assembler.is_closed(missed) else found
 
     def _descend(
         self, assembler: Assembler, way: list[np.ndarray], motors: np.ndarray, level: Sequence[PosePotential]

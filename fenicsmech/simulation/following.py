@@ -24,6 +24,7 @@ from fenicsmech.continuation import (
 from fenicsmech.equilibrium import DisplacementControl, EquilibriumPoint, LoadControl, NotConverged, State, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, finite, set_fields, whole
 from fenicsmech.mechanism import Configuration, Drive, Force, ForceGroup, Mechanism, Motor, PrescribedPart
+from fenicsmech.multibody import RestSearch
 from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve, axes
 from fenicsmech.simulation.discretisation import Discretisation
@@ -243,7 +244,8 @@ class CurveFollower:
 
     def _within(self, travel: float) -> tuple[float, ...]:
         """The wanted displacements that the point reaches without a force, which moves freely as far as ``travel``."""
-        return tuple(end for end in self._until.displacements if end * travel > 0.0 and abs(end) <= abs(travel))
+        free = abs(travel) + RestSearch().near * self._system.joints.length
+        return tuple(end for end in self._until.displacements if end * travel > 0.0 and abs(end) <= free)
 
     def _moved_freely(self, ends: Sequence[float], watch: Callable[[int], None]) -> FollowedCurve:
         """The curve on which nothing resists, until the first of ``ends``."""
@@ -258,7 +260,8 @@ class CurveFollower:
         if conjugate:
             point = equilibrium_at(self._stepper.solver, self._followed, state)
             # of the point itself: rounding turns what nothing holds yet
-            moves = abs(point.conjugate_rate) > self._system.ideal_compliance
+            rate = agreed(self._system.comm, abs(point.conjugate_rate)) / self._system.joints.length
+            moves = rate > self._system.ideal_compliance
             reach = linear_reach(point, value=reach, conjugate=conjugate) if moves else 0.0
         if not 0.0 < reach < math.inf:
             raise NotConverged(f"it moves nothing beyond displacement {self._conjugate(state):g}, where travel ends")

@@ -3,8 +3,8 @@
 Dead loads on a flexible link, those whose energy is linear in displacements, are replaced by their potential as the
 link moves rigidly, from their sum and moments. Other loads prefer no pose if they balance on each link, as pressure on
 a closed part does, and contact as long as nothing touches: no point meets an obstacle on a way that is shorter than its
-gap. The pose as drawn remains the start, and the log says so, where they do not on the way; the last start does where
-loads drive the mechanism on without end, or no pose is found.
+gaps at both ends together. The pose as drawn remains the start, and the log says so, where they do not on the way; the
+last start does where loads drive the mechanism on without end, or no pose is found.
 """
 
 from __future__ import annotations
@@ -192,26 +192,31 @@ class RestPoses:
     def _obstructed(self, before: np.ndarray, after: np.ndarray) -> str | None:
         """The first flexible link that may meet an obstacle on the way from poses of all bodies to others.
 
-        The way is bisected until each point's gaps at both ends are larger than its motion: spheres of these radii
-        around both ends, which are clear, then hold any way between them up to twice as long.
+        The way is bisected until each point's gaps at both ends, together, are larger than its motion by a quarter:
+        spheres of these radii around both ends, which are clear, then hold any way between them that is up to a quarter
+        longer than the straight one. Between poses that are near each other, points may meet an obstacle only if they
+        are in it at an end.
         """
-        model, comm = self._model, self._model.mesh.mesh.comm
-        ends = zip(self._system.surfaces, self._gaps(before), self._gaps(after), strict=True)
-        near = next(
-            (
-                surface.link.name
-                for surface, (start, gaps), (end, others) in ends
-                if np.any(np.linalg.norm(end - start, axis=1) >= np.minimum(gaps, others))
-            ),
-            None,
-        )
-        near = next(filter(None, comm.allgather(near)), None)
-        if near is None:
+        model, comm, search = self._model, self._model.mesh.mesh.comm, self._search
+        rigid, inside = model.linkage.rigid, -search.same * model.linkage.length
+        close: set[str] = set()
+        met: set[str] = set()
+        for surface, (start, gaps), (end, others) in zip(
+            self._system.surfaces, self._gaps(before), self._gaps(after), strict=True
+        ):
+            if np.any(1.25 * np.linalg.norm(end - start, axis=1) > gaps + others):
+                close.add(surface.link.name)
+            if np.any(np.minimum(gaps, others) < inside):
+                met.add(surface.link.name)
+        close, met = (set().union(*comm.allgather(names)) for names in (close, met))
+        if met or not close:
+            return min(met, default=None)
+        if from_one(comm, lambda: search.distance(rigid, before, after)) <= search.clear:
             return None
         arguments = before, after, self._motors, model.spring_potentials
-        middle = from_one(comm, lambda: self._search.halfway(model.linkage.rigid, *arguments))
+        middle = from_one(comm, lambda: search.halfway(rigid, *arguments))
         if middle is None:
-            return near
+            return min(close)
         return self._obstructed(before, middle) or self._obstructed(middle, after)
 
     def _gaps(self, poses: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -198,8 +198,10 @@ class CurveStepper:
         """A context whose time counts as that of the next frame."""
         clock = self._model.clock
         began, seconds = perf_counter(), dict(clock.seconds)
-        yield
-        self._effort += Effort(seconds=perf_counter() - began, phases=clock.since(seconds))
+        try:
+            yield
+        finally:
+            self._effort += Effort(seconds=perf_counter() - began, phases=clock.since(seconds))
 
     def curve(self, watch: Callable[[int], None]) -> Curve:
         """The frames of all prescribed values; ``watch`` is called with the number of frames so far."""

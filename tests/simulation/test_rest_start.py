@@ -300,6 +300,24 @@ def test_body_forces_without_a_sum_turn_a_rod_by_their_moments():
     assert frame.stable and not frame.snapped_through
 
 
+@pytest.mark.parametrize("gap", [1e-9, 1e-3])
+def test_rod_drawn_close_to_a_wall_is_pulled_away_from_it(gap):
+    wall = fm.HalfPlane((-0.5 * WIDTH - gap, 0), (1, 0))
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, wall))
+    (frame,) = simulation.load_displacement(pull, forces=[1e-3]).frames
+    assert frame.displacement == pytest.approx(LENGTH, rel=1e-6)
+    assert frame.stable and not frame.snapped_through
+
+
+def test_loads_that_balance_on_a_link_leave_its_rest_to_rounding():
+    # the rod starts as drawn, since a wall is in its way, and nothing but rounding resists the pressure's steps
+    wall = fm.HalfPlane((0.5 * LENGTH, 0), (-1, 0))
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, wall), lambda rod: fm.Pressure(rod, -17.6))
+    frames = simulation.load_displacement(pull, displacements=[0.4 * LENGTH, 0.6 * LENGTH]).frames
+    assert frames[0].displacement == pytest.approx(0.4 * LENGTH)
+    assert frames[1].force > 0.0
+
+
 def beside(angle: float, radius: float, distance: float = NEAR) -> fm.Cylinder:
     """A pin at a distance from the hinge, ``angle`` ahead of a rod that hangs straight down."""
     return fm.Cylinder((distance * math.sin(angle), -distance * math.cos(angle)), radius)
@@ -356,19 +374,21 @@ def test_path_until_a_force_begins_at_a_part_of_it_and_is_the_only_one_that_is_s
     assert len(made) == 1
 
 
-def test_path_beyond_the_travel_of_a_rigid_pendulum_says_that_it_ends():
-    mechanism = fm.Mechanism("rigid pendulum")
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 20.0])
+def test_path_beyond_the_travel_of_a_rigid_pendulum_says_that_it_ends(scale):
+    mechanism, length = fm.Mechanism("rigid pendulum"), scale * LENGTH
     base, rod = mechanism.rigid("base", fixed=True), mechanism.rigid("rod")
-    flag = mechanism.flexible("flag", fm.strip([(0, -LENGTH), (10, -LENGTH)], thickness=WIDTH, depth=DEPTH), fm.ONYX)
+    strip = fm.strip([(0, -length), (10 * scale, -length)], thickness=scale * WIDTH, depth=scale * DEPTH)
+    flag = mechanism.flexible("flag", strip, fm.ONYX)
     mechanism.revolute(base, rod, at=(0, 0))
-    mechanism.weld(rod, flag, at=(0, -LENGTH), interface_radius=1.0)
-    pull = mechanism.force(on=rod, at=(0, -LENGTH), direction=(1, 0), name="pull")
-    simulation = simulated(mechanism)
-    for end in (fm.Until(displacement=2.0 * LENGTH), fm.Until(displacement=2.0 * LENGTH, force=1e3)):
-        with pytest.raises(fm.EquilibriumError, match="moves nothing beyond displacement 60, where travel ends"):
+    mechanism.weld(rod, flag, at=(0, -length), interface_radius=scale)
+    pull = mechanism.force(on=rod, at=(0, -length), direction=(1, 0), name="pull")
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.0 * scale, comm=MPI.COMM_SELF)
+    for end in (fm.Until(displacement=2.0 * length), fm.Until(displacement=2.0 * length, force=1e3 * scale**2)):
+        with pytest.raises(fm.EquilibriumError, match=f"moves nothing beyond displacement {length:g}, where travel"):
             simulation.follow(pull, until=end)
-    reached = simulation.follow(pull, until=fm.Until(displacement=LENGTH))
-    assert reached.displacements[-1] == pytest.approx(LENGTH)  # a dead centre: any force is in equilibrium there
+    reached = simulation.follow(pull, until=fm.Until(displacement=length))
+    assert reached.displacements[-1] == pytest.approx(length)  # a dead centre: any force is in equilibrium there
 
 
 @pytest.mark.parallel
