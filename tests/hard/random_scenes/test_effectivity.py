@@ -45,7 +45,9 @@ def first(topology: str, control: str) -> Blueprint:
 def test_estimates_of_simple_scenes_are_within_a_factor_of_two(topology, control):
     found = judge_scene(0, first(topology, control))
     assert {own.outcome for own in found.kinds.values()} <= {"within", "below resolution"}
-    assert found.elements.outcome == "within" and not found.elements.doubts
+    own = found.elements
+    assert own.outcome == "within"
+    assert not own.doubts or abs(own.estimate) < own.resolution  # what hardly strains may be in doubt
 
 
 def test_errors_beyond_first_order_are_doubted():

@@ -77,7 +77,7 @@ class Thresholds:
     adrift: float = 1e-6
     soft: float = 0.1
     unreached: float = 2.0
-    tied: float = 1e2  # any weight gives a lower bound; larger ones hinder convergence
+    tied: float = 1e3  # any weight gives a lower bound; larger ones hinder convergence
     inverted: float = 0.1
     strained: float = 2.0
     strained_share: float = 0.05
