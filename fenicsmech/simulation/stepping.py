@@ -314,10 +314,16 @@ class CurveStepper:
         except LoadStepsFailed as failure:
             strained = "links and springs" if wound else "the links"
             beyond = "there" if fraction == 1.0 else f"beyond {failure.reached:.1%} of their way"
+            tried, nearer = failure.reason, "nearer to the drawn ones"
+            if failure.fold is not None:
+                moved = ((motor, position) for motor, position in configuration.positions if position)
+                turn = ", ".join(f"{motor.name!r} at {failure.fold * position:.6g}" for motor, position in moved)
+                tried = f"the path turns back near {turn}; {tried}"
+                nearer = "before the turn, which follow() goes round"
             raise EquilibriumError(
                 f"configuration {configuration.name!r}",
-                f"the motors strain {strained}, and no equilibrium was found {beyond} ({failure.reason})",
-                "Choose motor positions nearer to the drawn ones, or a softer link or spring",
+                f"the motors strain {strained}, and no equilibrium was found {beyond} ({tried})",
+                f"Choose motor positions {nearer}, or a softer link or spring",
                 last=self._last(failure),
             ) from failure
         self._effort += Effort(stepper.iterations, stepper.snaps)

@@ -7,6 +7,7 @@ import pytest
 
 import fenicsmech as fm
 
+from ..equilibrium import toggle
 from ..equilibrium.curved_beam import RISE, beam_forces, curved_beam
 
 
@@ -18,6 +19,22 @@ def test_curve_that_ends_where_the_displacement_turns_back_says_where_and_names_
     with pytest.raises(fm.EquilibriumError, match=r"Use follow\(\), which goes round the turn") as caught:
         simulation.load_displacement(push, displacements=values)
     (found,) = re.findall("the path turns back near ([0-9.]+);", str(caught.value))
+    assert float(found) == pytest.approx(fold, rel=1e-3)
+
+
+def test_motors_that_end_where_their_path_turns_back_are_said_to_with_their_position_there():
+    case = toggle.toggle(stilt_modulus=0.075)
+    mechanism = case.simulation.scene.mechanism
+    (guide,) = (joint for joint in mechanism.joints if joint.b.name == "head" and joint.kind.sliding)
+    motor = mechanism.motor(guide)
+    # iterations that suffice along the path, but not for the snap beyond its fold
+    options = {"space": "plane-stress", "order": 1, "size": 6.0, "solver": fm.PrimalDualNewton(iterations=4)}
+    simulation = fm.Simulation(case.simulation.scene, **options)
+    fold = simulation.follow(motor, until=fm.Until(position=-6.0, frames=30)).turning_points[0].frame.displacement
+    driven = simulation.scene.configuration("driven", {motor: -5.8})
+    with pytest.raises(fm.EquilibriumError, match=r"before the turn, which follow\(\) goes round") as caught:
+        simulation.load_displacement(case.push, forces=[0.0], configuration=driven)
+    (found,) = re.findall("the path turns back near '.*' at (-[0-9.]+);", str(caught.value))
     assert float(found) == pytest.approx(fold, rel=1e-3)
 
 

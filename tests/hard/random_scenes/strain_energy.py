@@ -89,7 +89,10 @@ def energy_density(
         across = _free_stretch(jacobian.real, mu, lam) if space == "plane-stress" else 1.0
         trace, jacobian = trace + across**2, jacobian * across
     jacobian = np.where(jacobian.real > 0.0, jacobian, np.nan)
-    return _LAWS[law](trace, jacobian, mu, lam) if p is None else _MIXED[law](trace, jacobian, p, mu, lam)
+    if p is None:
+        return _LAWS[law](trace, jacobian, mu, lam)
+    p = p.astype(np.result_type(p.dtype, REAL))  # extended scalars do not promote arrays
+    return _MIXED[law](trace, jacobian, p, mu, lam)
 
 
 def determinant(F: np.ndarray) -> np.ndarray:
