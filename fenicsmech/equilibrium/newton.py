@@ -176,8 +176,7 @@ class NewtonSolver(EquilibriumSolver):
             last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
             closer = residual.norm <= norm and self.relative(residual) < options.near
             if near and not closer and not self.converged(residual, norm):
-                moved = length * system.size(step)
-                if length == 1.0 and moved <= options.contraction * raising:
+                if length == 1.0 and (moved := system.size(step)) <= options.contraction * raising:
                     diverged, raising = diverged or before, moved
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent makes progress

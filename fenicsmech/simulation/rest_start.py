@@ -28,6 +28,7 @@ from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import DeadLoad, PosePotential, RestEnding, RestSearch, TravelSpring, count_freedom
 
 _log = logger(__name__)
+_Gaps = list[tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,12 +186,15 @@ class RestPoses:
         for poses in way if self._model.elastic.has_other_than_dead_loads else ():
             if link := self._disturbed(self._at(poses)):
                 yield f"{link!r} meets loads that are not dead"
-        for before, after in pairwise(way):
-            if self._system.surfaces and (link := self._obstructed(before, after)):
+        if not self._system.surfaces:
+            return
+        for before, after in pairwise((poses, self._gaps(poses)) for poses in way):
+            if link := self._obstructed(before, after):
                 yield f"{link!r} meets an obstacle, or passes it closely"
 
-    def _obstructed(self, before: np.ndarray, after: np.ndarray) -> str | None:
-        """The first flexible link that may meet an obstacle on the way from poses of all bodies to others.
+    def _obstructed(self, before: tuple[np.ndarray, _Gaps], after: tuple[np.ndarray, _Gaps]) -> str | None:
+        """The first flexible link that may meet an obstacle on the way from poses of all bodies to others, with their
+        gaps.
 
         The way is bisected until each point's gaps at both ends, together, are larger than its motion by a quarter:
         spheres of these radii around both ends, which are clear, then hold any way between them that is up to a quarter
@@ -201,9 +205,7 @@ class RestPoses:
         rigid, inside = model.linkage.rigid, -search.same * model.linkage.length
         close: set[str] = set()
         met: set[str] = set()
-        for surface, (start, gaps), (end, others) in zip(
-            self._system.surfaces, self._gaps(before), self._gaps(after), strict=True
-        ):
+        for surface, (start, gaps), (end, others) in zip(self._system.surfaces, before[1], after[1], strict=True):
             if np.any(1.25 * np.linalg.norm(end - start, axis=1) > gaps + others):
                 close.add(surface.link.name)
             if np.any(np.minimum(gaps, others) < inside):
@@ -211,15 +213,16 @@ class RestPoses:
         close, met = (set().union(*comm.allgather(names)) for names in (close, met))
         if met or not close:
             return min(met, default=None)
-        if from_one(comm, lambda: search.distance(rigid, before, after)) <= search.clear:
+        if from_one(comm, lambda: search.distance(rigid, before[0], after[0])) <= search.clear:
             return None
-        arguments = before, after, self._motors, model.spring_potentials
-        middle = from_one(comm, lambda: search.halfway(rigid, *arguments))
-        if middle is None:
+        arguments = before[0], after[0], self._motors, model.spring_potentials
+        poses = from_one(comm, lambda: search.halfway(rigid, *arguments))
+        if poses is None:
             return min(close)
+        middle = poses, self._gaps(poses)
         return self._obstructed(before, middle) or self._obstructed(middle, after)
 
-    def _gaps(self, poses: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _gaps(self, poses: np.ndarray) -> _Gaps:
         """Of each surface, this rank's points at the ``poses`` of all bodies, (n, dim), and their gaps, (n,)."""
         self._model.load(self._at(poses))
         for surface in self._system.surfaces:
