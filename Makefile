@@ -28,7 +28,7 @@ export PRTE_MCA_hwloc_default_binding_policy := none
 MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
-.PHONY: help demo test check install install-test install-docs lint test-serial test-parallel test-thorough test-slow \
+.PHONY: help demo live live-pictures test check install install-test install-docs lint test-serial test-parallel test-thorough test-slow \
     test-debian13 test-newest demos-quick hard-cases random-scenes random-scenes-check effectivity docs bench clean
 
 help: ## list the targets
@@ -36,6 +36,12 @@ help: ## list the targets
 
 demo: install ## install what is missing and run the truss finger; pictures and summary.json in results/truss/
 	$(PYTHON) demos/truss.py
+
+live: install ## the live page: a mechanism to hold in your hand, on this machine
+	$(PYTHON) -m fenicsmech.live
+
+live-pictures: install-test ## pictures of the live page in docs/static/
+	$(PYTHON) tools/live_pictures.py
 
 test: lint test-serial test-parallel ## style, types, layers; fast tests, quick demos among them, on one process; on two ranks
 
@@ -62,7 +68,7 @@ lint: install-test ## style, types and layering: seconds
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
 # Two processes side by side, half of the tests each; the one that is done first takes over tests of the other. What is
-# marked `parallel` runs on ranks instead, and on one process in `make test-thorough`.
+# marked `parallel` runs on ranks instead, and on one process in `make test-thorough` unless it is thorough too.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5
 SERIAL = $(PYTEST) -n 2 --dist worksteal --ignore tests/test_layering.py
 TESTS := tests
@@ -75,9 +81,9 @@ test-parallel: install-test ## the fast tests marked `parallel`, on two MPI rank
 	$(call heading,tests on $(RANKS) ranks)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and not thorough and $(SELECT)" $(TESTS)
 
-test-thorough: install-test ## the others: parallel ones on one process, those marked `thorough` on one process and on ranks
+test-thorough: install-test ## those marked `thorough`, on ranks if `parallel` too; the other parallel ones on one process
 	$(call heading,thorough tests)
-	$(SERIAL) -m "(parallel or thorough) and $(SELECT)" $(TESTS)
+	$(SERIAL) -m "(parallel and not thorough or thorough and not parallel) and $(SELECT)" $(TESTS)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and thorough and $(SELECT)" $(TESTS)
 	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider tests/simulation/test_ranks.py
 
@@ -93,11 +99,12 @@ random-scenes: install-test ## N random scenes from SEED on (1000, 0), each chec
 	$(call heading,random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count $(N) --seed $(SEED) --write
 
+# Seed 10016 ends in its equilibria after 281 s of a processor: where those are slower, that is no hang.
 random-scenes-check: install-test ## a fixed block, the hundred seeds from 10000 on, afresh
 	$(call heading,a hundred random scenes)
-	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count 100 --seed 10000 --out "$$(mktemp -d)"
+	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count 100 --seed 10000 --limit 900 --out "$$(mktemp -d)"
 
-effectivity: install-test ## error estimates of 300 random scenes from seed 14000 on, against finer elements and space
+effectivity: install-test ## error estimates of 300 random scenes from seed 16000 on, against finer elements and space
 	$(call heading,effectivity of error estimates)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes.effectivity --write
 
@@ -136,7 +143,7 @@ hard-cases: install-test ## every case of tests/hard/, slow ones too, as a table
 	$(PYTHON) -m tests.hard
 
 # The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
-BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers constrained closeness handles parts
+BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers constrained closeness handles parts stress live
 BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
 bench: install ## seconds per load step of every demo's initial design: 3D, on ranks with whole designs, plane stress

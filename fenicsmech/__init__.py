@@ -18,9 +18,13 @@ from fenicsmech.design import (
     BFGS,
     SQP,
     Correction,
+    DesignIterate,
+    DesignLinearisation,
     DesignProblem,
     DesignResult,
     Experiment,
+    LawFit,
+    LawFitOptions,
     LevenbergMarquardt,
     LinkDesign,
     MeshQuality,
@@ -29,17 +33,22 @@ from fenicsmech.design import (
     NumberBounds,
     NumberDesign,
     Optimiser,
+    ParameterFit,
+    ParameterFitOptions,
     PartValue,
     Regulariser,
     Scatter,
     SearchResult,
     ShapeBounds,
+    SpecimenTest,
     SplineDesign,
     StartResult,
     StayClose,
     Target,
     TargetResult,
+    fit_law,
     fit_modulus,
+    fit_parameters,
 )
 from fenicsmech.effects import (
     Boundary,
@@ -55,6 +64,7 @@ from fenicsmech.effects import (
     Obstacle,
     Pressure,
     Prestrain,
+    Temperature,
 )
 from fenicsmech.elasticity import (
     DisplacementFormulation,
@@ -63,6 +73,7 @@ from fenicsmech.elasticity import (
     MixedFormulation,
     Quadrature,
     Stretch,
+    specimen_stress,
 )
 from fenicsmech.equilibrium import (
     BySize,
@@ -92,20 +103,28 @@ from fenicsmech.estimates import Choice, DoubtOptions
 from fenicsmech.files import read_csv
 from fenicsmech.joints import JointKind, PlanarMarker, SpatialMarker
 from fenicsmech.laws import (
+    Gent,
     IsochoricNeoHookean,
     IsochoricSimoNeoHookean,
     Law,
     LogarithmicNeoHookean,
+    MooneyRivlin,
     NeoHookean,
+    Ogden,
+    Orthotropic,
     SplitLaw,
     Strain,
+    TransverselyIsotropic,
     Volumetric,
+    Yeoh,
 )
+from fenicsmech.live import live
 from fenicsmech.log import configure_logging, print_once
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
     SMOOTH_SIL_950,
+    Allowable,
     Arc,
     Basquin,
     Configuration,
@@ -159,7 +178,10 @@ from fenicsmech.quantities import (
     JointForce,
     JointMoment,
     JointPosition,
+    LargestCurvature,
     LawParameter,
+    LeastGap,
+    LeastThickness,
     LinkMass,
     LinkVolume,
     Magnitude,
@@ -178,6 +200,7 @@ from fenicsmech.quantities import (
     SpringRest,
     SpringStiffness,
     StrainEnergy,
+    TemperatureChange,
     at,
     border_of,
 )
@@ -194,9 +217,31 @@ from fenicsmech.simulation import (
     PathEvent,
     PinFriction,
     RestShape,
+    SafeLimit,
+    SafeRange,
+    SafeRangeOptions,
     Simulation,
     SoftMode,
     Until,
+)
+from fenicsmech.stress import (
+    EdgeStress,
+    InterpolationOptions,
+    LargestStrain,
+    LargestStress,
+    LawStability,
+    LeastLife,
+    LeastSafety,
+    Life,
+    LinkLife,
+    LinkSafety,
+    RecoveryOptions,
+    Safety,
+    SingularityOptions,
+    SingularPlace,
+    StressField,
+    StressOptions,
+    StressPeak,
 )
 
 __version__ = "0.1.0"
@@ -209,23 +254,29 @@ __all__ = [
     "Rectangle", "Face", "Scene", "Configuration", "DRAWN", "Units",
     # materials and laws; Law, SplitLaw, Strain and Volumetric for laws of your own
     "Material", "material", "material_names", "material_card", "MaterialCard", "Figure", "Source", "Strength",
-    "Basquin", "ONYX", "SMOOTH_SIL_950", "NeoHookean", "LogarithmicNeoHookean", "IsochoricNeoHookean",
-    "IsochoricSimoNeoHookean", "Law", "SplitLaw", "Strain", "Volumetric",
+    "Basquin", "Allowable", "ONYX", "SMOOTH_SIL_950", "NeoHookean", "LogarithmicNeoHookean", "IsochoricNeoHookean",
+    "IsochoricSimoNeoHookean", "MooneyRivlin", "Yeoh", "Gent", "Ogden", "Orthotropic",
+    "TransverselyIsotropic", "Law", "SplitLaw", "Strain", "Volumetric",
     # joint kinds of your own
     "JointKind", "PlanarMarker", "SpatialMarker",
     # effects; Effect and those after it for effects of your own
-    "Gravity", "Mass", "Pressure", "Prestrain", "JointSpring", "JointCompliance", "Contact", "HalfPlane", "Cylinder",
+    "Gravity", "Mass", "Pressure", "Prestrain", "Temperature", "JointSpring", "JointCompliance", "Contact", "HalfPlane",
+    "Cylinder",
     "Effect", "Faces", "LinkFields", "Obstacle", "PosePotential", "Stretch", "Boundary", "ElasticModel", "Linkage",
     "BodyPoint", "in_dimension",
     # simulation, its curves and their results
     "Simulation", "SPACES", "Fidelity", "Quadrature", "Choice", "Predictor", "HermitePredictor", "TangentPredictor",
-    "ConstantPredictor", "DoubtOptions",
+    "ConstantPredictor", "DoubtOptions", "StressPeak", "SingularPlace", "StressField", "EdgeStress",
+    "StressOptions", "RecoveryOptions", "InterpolationOptions", "SingularityOptions",
+    "Safety", "LinkSafety", "LawStability", "Life", "LinkLife", "SafeRange", "SafeLimit", "SafeRangeOptions",
     "RestShape", "Curve", "Frame", "Axis", "Unknown", "Freedom", "Reaction", "Explanation", "Hint", "PinFriction",
     "write_report", "Report", "plot_curve", "CurveSeries", "CurveMark", "CurveTarget", "Trace", "read_csv",
     "print_once", "configure_logging", "mpi_abort_on_error",
     # quantities of equilibria; those from Observable on for quantities of your own
     "Sample", "at", "PrescribedDisplacement", "Quantity", "Displacement", "Rotation", "ForceMagnitude", "MotorTorque",
-    "JointForce", "JointMoment", "StrainEnergy", "LinkMass", "LinkVolume", "CentrelineLength", "Component", "Magnitude",
+    "JointForce", "JointMoment", "StrainEnergy", "LinkMass", "LinkVolume", "CentrelineLength", "LeastThickness",
+    "LargestCurvature", "LeastGap", "LargestStress", "LargestStrain", "LeastSafety", "LeastLife", "Component",
+    "Magnitude",
     "Observable", "RestObservable", "Partial", "FormValue", "border_of",
     # path following, stability and buckling
     "FollowedCurve", "ArcSteps", "Critical", "Until", "PathEvent", "CriticalPoint", "BucklingPoint", "SoftMode",
@@ -237,10 +288,15 @@ __all__ = [
     # design and characterisation
     "DesignProblem", "SplineDesign", "ShapeBounds", "Target", "StayClose", "MeshQuality", "Regulariser",
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
+    "DesignIterate", "DesignLinearisation",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
-    "fit_modulus", "Design",
+    "fit_modulus", "fit_parameters", "ParameterFit", "ParameterFitOptions",
+    "SpecimenTest", "fit_law", "LawFit", "LawFitOptions", "specimen_stress", "Design",
+    # the live page
+    "live",
     # numbers that designs change in addition to shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
+    "TemperatureChange",
     "NumberBounds", "NumberDesign", "NumberKind", "ModelNumber", "EffectNumber", "NumberTerms",
     "JointChange", "PlacedPoint",
     # errors

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar, cast
 
+import numpy as np
 from mpi4py import MPI
 
 T = TypeVar("T")
@@ -34,6 +35,24 @@ def from_one(comm: MPI.Comm, work: Callable[[], T]) -> T:
 def agreed(comm: MPI.Comm, value: T) -> T:
     """The ``value`` of the first process, on all."""
     return comm.bcast(value, root=0)
+
+
+def gathered(comm: MPI.Comm, numbers: np.ndarray, values: np.ndarray, count: int) -> np.ndarray | None:
+    """The values of all ``count`` vertices or cells on rank 0, from those of each rank with their numbers."""
+    parts = comm.gather((numbers, values), root=0)
+    if parts is None:
+        return None
+    whole = np.zeros((count, *values.shape[1:]), dtype=values.dtype)
+    for places, part in parts:
+        whole[places] = part
+    return whole
+
+
+def scattered(comm: MPI.Comm, numbers: np.ndarray, values: np.ndarray | None) -> np.ndarray:
+    """Of the ``values`` of all vertices or cells on rank 0, those of each rank with their numbers."""
+    parts = comm.gather(numbers, root=0)
+    # others than rank 0 send nothing
+    return comm.scatter([] if parts is None or values is None else [values[own] for own in parts], root=0)
 
 
 def on_all(comm: MPI.Comm, work: Callable[[], T]) -> T:

@@ -20,6 +20,7 @@ from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 
+import basix
 import dolfinx
 import dolfinx.fem.petsc
 import numpy as np
@@ -34,7 +35,10 @@ from fenicsmech.log import logger
 
 _log = logger(__name__)
 
-_VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+DOLFINX = dolfinx.__version__
+"""The version of dolfinx."""
+
+_VERSION = tuple(int(part) for part in DOLFINX.split(".")[:2])
 _LEGACY = _VERSION < (0, 6)
 
 if not _LEGACY:
@@ -144,6 +148,12 @@ def cell_dofs(space: fem.FunctionSpace) -> np.ndarray:
     return dofmap.list.array.reshape(-1, dofmap.dof_layout.num_dofs) if _LEGACY else np.asarray(dofmap.list)
 
 
+def global_dofs(space: fem.FunctionSpace) -> np.ndarray:
+    """Numbers over all ranks of this rank's nodes of a space, ghosts last."""
+    index = space.dofmap.index_map
+    return index.local_to_global(np.arange(index.size_local + index.num_ghosts, dtype=np.int32)).astype(np.int64)
+
+
 def interpolation_matrix(coarse: fem.FunctionSpace, fine: fem.FunctionSpace) -> csr_matrix:
     """Interpolation: this rank's owned DOFs of ``fine`` by all DOFs of ``coarse``, numbered over all ranks."""
     matrix = dolfinx.cpp.fem.petsc.interpolation_matrix(coarse._cpp_object, fine._cpp_object)
@@ -167,9 +177,9 @@ def vector_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
     return _space(mesh, "Lagrange", degree, rank=1)
 
 
-def tensor_space(mesh: dmesh.Mesh, degree: int) -> fem.FunctionSpace:
-    """Continuous fields of square tensors, of ``degree``."""
-    return _space(mesh, "Lagrange", degree, rank=2)
+def tensor_space(mesh: dmesh.Mesh, degree: int, size: int | None = None) -> fem.FunctionSpace:
+    """Continuous fields of square tensors, of ``degree``; of the mesh's dimension unless a ``size`` is given."""
+    return _space(mesh, "Lagrange", degree, rank=2, size=size)
 
 
 def cellwise_space(mesh: dmesh.Mesh, degree: int = 0) -> fem.FunctionSpace:
@@ -177,13 +187,42 @@ def cellwise_space(mesh: dmesh.Mesh, degree: int = 0) -> fem.FunctionSpace:
     return _space(mesh, "DG", degree)
 
 
-def _space(mesh: dmesh.Mesh, family: str, degree: int, *, rank: int = 0) -> fem.FunctionSpace:
+def quadrature_space(mesh: dmesh.Mesh, degree: int, size: int) -> fem.FunctionSpace:
+    """Vectors of ``size`` at the points of the quadrature of ``degree``, in their order."""
+    with compiling():
+        if _LEGACY:
+            element = ufl.VectorElement("Quadrature", mesh.ufl_cell(), degree, dim=size, quad_scheme="default")
+            return fem.FunctionSpace(mesh, element, jit_params=_options())
+        element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=(size,), degree=degree)
+        options = {"jit_options": _options()} if _VERSION < (0, 10) else {}
+        return fem.functionspace(mesh, element, **options)
+
+
+def lagrange_element(dim: int, nodes: int):
+    """Basix's element of the scalar Lagrange fields with as many ``nodes`` in a cell."""
+    cell, degree = {
+        (2, 3): ("triangle", 1), (2, 6): ("triangle", 2), (2, 10): ("triangle", 3),
+        (3, 4): ("tetrahedron", 1), (3, 10): ("tetrahedron", 2), (3, 20): ("tetrahedron", 3),
+    }[dim, nodes]  # fmt: skip
+    kind = getattr(basix.CellType, cell)
+    return basix.create_element(basix.ElementFamily.P, kind, degree, basix.LagrangeVariant.gll_warped)
+
+
+def lagrange_values(points: np.ndarray, nodes: int) -> np.ndarray:
+    """Values of its basis at ``points`` of the reference cell (n, dim), (n, nodes)."""
+    return lagrange_element(points.shape[1], nodes).tabulate(0, points)[0, ..., 0]
+
+
+def _space(mesh: dmesh.Mesh, family: str, degree: int, *, rank: int = 0, size: int | None = None) -> fem.FunctionSpace:
+    own = size or mesh.geometry.dim
     with compiling():
         if _LEGACY:
             element = (ufl.FiniteElement, ufl.VectorElement, ufl.TensorElement)[rank]
-            return fem.FunctionSpace(mesh, element(family, mesh.ufl_cell(), degree), jit_params=_options())
+            sizes = ({}, {"dim": own}, {"shape": (own, own)})[rank]
+            kind = element(family, mesh.ufl_cell(), degree, **sizes)
+            return fem.FunctionSpace(mesh, kind, jit_params=_options())
         options = {"jit_options": _options()} if _VERSION < (0, 10) else {}
-        shape = ((mesh.geometry.dim,) * rank,) if rank else ()
+        shape = ((own,) * rank,) if rank else ()
         return fem.functionspace(mesh, (family, degree, *shape), **options)
 
 

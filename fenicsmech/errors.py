@@ -121,6 +121,16 @@ def point_text(point: Iterable[float]) -> str:
     return f"({', '.join(f'{c:g}' for c in point)})"
 
 
+def with_error(value: float, error: float) -> str:
+    """A value to the first digit of its error, and this: ``13.02 ± 0.08``."""
+    if not (value and error > 0.0):
+        return f"{value:.3g}"
+    place = math.floor(math.log10(error))
+    if not -4 <= place <= 3:
+        return f"{value:.4g} ± {error:.1g}"
+    return f"{round(value, -place):.{max(-place, 0)}f} ± {round(error, -place):g}"
+
+
 def counted(number: int, noun: str, plural: str = "") -> str:
     """A number of things as messages show it: ``1 point``, ``2 points``."""
     return f"{number} {noun if number == 1 else plural or noun + 's'}"

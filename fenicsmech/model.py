@@ -29,7 +29,7 @@ from fenicsmech.elasticity import (
     Quadrature,
     Stretch,
 )
-from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, load_fields
+from fenicsmech.equilibrium import EquilibriumSystem, PointLoad, State, TurningLink, load_fields
 from fenicsmech.errors import DescriptionError, expect, positive, set_fields, whole
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
@@ -63,13 +63,13 @@ from fenicsmech.meshing import (
 from fenicsmech.multibody import (
     BodyPoint,
     DesignAtNodes,
-    IdleSpin,
     InterfaceMap,
     Linkage,
     LinkPoint,
     PlacedPoint,
-    idle_spins,
+    Spin,
     link_point,
+    spins,
 )
 
 SPACES = {model.name: model for model in (SPATIAL, MID_PLANE_SYMMETRIC, PLANE_STRESS, PLANE_STRAIN)}
@@ -317,6 +317,7 @@ class MechanismModel:
         self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)
         self.shapes = tuple(shapes or [link.shape for link in links])
         self.depths = tuple(shape.depth for shape in self.shapes)
+        fidelity.model.check(list(self.materials))
         self.mixed = fidelity.formulation.mixed(list(self.materials), fidelity.model, fidelity.order)
         faces = [part for effect in effects for part in effect.faces]
         boundaries = find_boundaries(mesh.mesh, links, mesh.link, faces, half=fidelity.model.half)
@@ -583,14 +584,28 @@ class MechanismModel:
             self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),), ((force.on, at),))
         return self._point_loads[force]
 
-    def _idle_spins(self, loads: Sequence[PointLoad]) -> tuple[IdleSpin, ...]:
-        """The spins that neither loads nor potentials nor effects resist; obstacles may."""
+    def _spins(self, loads: Sequence[PointLoad], touching: Collection[FlexibleLink]) -> tuple[list[Spin], list[Spin]]:
+        """The spins that neither loads nor potentials nor effects resist, obstacles may; and those that loads or
+        obstacles may resist."""
         _ = self.elastic.effects_ufl  # names the effects on links
         links = self.mechanism.flexible_links
         bodies = {body for potential in self.potentials for body in potential.bodies}
         bodies |= {self.linkage.body_of(link) for own in self._on_links for link in links if not own.turns_with(link)}
         forces = [(self.linkage.body_of(link), at) for load in loads for link, at in load.places]
-        return idle_spins(self.linkage, bodies, forces)
+        found = spins(self.linkage)
+        idle = [spin for spin in found if spin.is_idle(bodies, forces)]
+        return idle, [spin for spin in found if spin not in idle or not spin.links.isdisjoint(touching)]
+
+    def _nodes(self, spin: Spin) -> np.ndarray:
+        """Owned nodes of the flexible links of a spin."""
+        links = [index for index, link in enumerate(self.linkage.interfaces) if link in spin.links]
+        return np.flatnonzero(np.isin(self.node_link[: self.interfaces.owned], links))
+
+    def _turning(self) -> list[TurningLink]:
+        """Bodies and owned nodes of each flexible link."""
+        link = self.node_link[: self.interfaces.owned]
+        own = enumerate(self.linkage.interfaces.values())
+        return [TurningLink(bodies, np.flatnonzero(link == k)) for k, bodies in own]
 
     def travel(self, part: Force | Output, state: State) -> float:
         """Travel of the point of a force or output in the loaded ``state``."""
@@ -598,16 +613,20 @@ class MechanismModel:
 
     def system(self, controlled: PointLoad, loads: Sequence[PointLoad]) -> EquilibriumSystem:
         """The equilibrium equations with one controlled load and some constant ones."""
+        one_sided = [constraint for effect in self.effects for constraint in effect.one_sided(self.fields)]
+        idle, resisted = self._spins([controlled, *loads], {surface.link for surface in one_sided})
         return EquilibriumSystem(
             self.elastic,
             self.interfaces,
             self.linkage.joints,
+            self._turning(),
             controlled=controlled,
             loads=loads,
             potentials=self.potentials,
             compliances=self._compliances,
-            one_sided=[constraint for effect in self.effects for constraint in effect.one_sided(self.fields)],
-            idle=self._idle_spins([controlled, *loads]),
+            one_sided=one_sided,
+            idle=idle,
+            resisted=[(spin, self._nodes(spin)) for spin in resisted],
             clock=self.clock,
             comm=self.mesh.comm,
         )
@@ -645,12 +664,22 @@ def _contradicted(kind: Any, others: Sequence[Any]) -> Any | None:
     return next((other for other in others if not set(other.slots).isdisjoint(kind.slots)), None)
 
 
-def _stretches(links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequence[Effect]) -> list[Stretch | None]:
-    """The stretch of the strain-free state of each link, which has at most one."""
-    found: dict[FlexibleLink, Stretch] = {}
+def _stretches(
+    links: Sequence[FlexibleLink], model: ElasticModel, effects: Sequence[Effect]
+) -> dict[str, list[Stretch | None]]:
+    """The stretches of the strain-free state of each link by kind of effect; each link has at most one of a kind."""
+    found: dict[str, dict[FlexibleLink, Stretch]] = {}
+    directed: set[FlexibleLink] = set()
     for effect in effects:
-        for link, stretch in effect.growth(model).items():
-            if link in found:
-                raise DescriptionError(f"link {link.name!r}", "it is prestrained twice", "Leave one out")
-            found[link] = stretch
-    return [found.get(link) for link in links]
+        for link, stretch in effect.growth(model, links).items():
+            kind = type(effect).__name__
+            own = found.setdefault(kind, {})
+            if link in own:
+                raise DescriptionError(f"link {link.name!r}", f"its {kind} is given twice", "Leave one out")
+            if stretch.along is not None and link in directed:
+                problem = f"its {kind} is the second effect that stretches it along a direction"
+                raise DescriptionError(f"link {link.name!r}", problem, "Leave one out: their order would count")
+            if stretch.along is not None:
+                directed.add(link)
+            own[link] = stretch
+    return {kind: [own.get(link) for link in links] for kind, own in found.items()}

@@ -68,6 +68,18 @@ def first_crossing(polygon: np.ndarray) -> np.ndarray | None:
     return polygon[i[k]] + t[k] * edge[i[k]]
 
 
+def divided_triangle(parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """A triangle with each side in ``parts``: barycentric coordinates in whole parts (p, 3), and the small triangles
+    between these points, in its orientation, (parts², 3)."""
+    places = np.array([(parts - i - j, i, j) for i in range(parts + 1) for j in range(parts + 1 - i)])
+    number = {(int(i), int(j)): k for k, (_, i, j) in enumerate(places)}
+    upright = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i in range(parts) for j in range(parts - i)]
+    turned = [
+        (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i in range(parts) for j in range(parts - 1 - i)
+    ]
+    return places, np.array(upright + turned)
+
+
 def edge_loops(triangles: np.ndarray) -> list[np.ndarray]:
     """The closed loops of edges that belong to one triangle only: outlines and holes alike; loops may touch.
 

@@ -17,6 +17,7 @@ With several configurations there is one CSV and one XDMF file for each.
 
 from __future__ import annotations
 
+import math
 import resource
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -30,13 +31,14 @@ from mpi4py import MPI
 from fenicsmech.collective import on_one
 from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.equilibrium import Unknown
-from fenicsmech.errors import DescriptionError, EquilibriumError, counted
+from fenicsmech.errors import DescriptionError, EquilibriumError, counted, point_text, with_error
 from fenicsmech.estimates import AccuracyOptions
 from fenicsmech.files import write_json
 from fenicsmech.log import logger, print_once
 from fenicsmech.mechanism import Force, ForceGroup, Mechanism
 from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, plot_curve
 from fenicsmech.simulation import Axis, Curve, Frame, Simulation, read_request
+from fenicsmech.stress import allowables
 
 _log = logger(__name__)
 
@@ -346,10 +348,28 @@ def _frames(curves: Sequence[Curve]) -> list[dict]:
             "redundancy": curve.freedom.redundancy,
             "strain_energy": frame.strain_energy,
             "max_von_mises": frame.max_stress,
+            "peak": asdict(frame.peak),
+            "safety": _safety(frame),
         }
         for curve in curves
         for frame in curve.frames
     ]
+
+
+def _safety(frame: Frame) -> dict[str, object] | None:
+    """The factor of safety; None where no material has an allowable."""
+    if not allowables(frame.stresses.materials):
+        return None
+    safety = frame.safety
+    return {
+        "factor": safety.factor if math.isfinite(safety.factor) else None,  # unloaded
+        "error": safety.error,
+        "link": safety.link,
+        "place": safety.place,
+        "allowable": asdict(safety.least.allowable),
+        "unknown": safety.unknown,
+        "text": str(safety),
+    }
 
 
 def _loaded(curves: Sequence[Curve]) -> list[Frame]:
@@ -377,7 +397,7 @@ def _text(summary: dict, folder: Path) -> str:
     lines = [format_table(headers, rows)]
     if summary["parameters"] is not None:
         lines += _design_text(summary)
-    lines += summary["remarks"]
+    lines += summary["remarks"] + _stress_text(summary) + _safety_text(summary)
     dofs, seconds = summary["dofs"], summary["seconds"]
     phases = ", ".join(f"{name} {value:.2f}" for name, value in seconds["phases"].items())
     lines += [
@@ -389,6 +409,27 @@ def _text(summary: dict, folder: Path) -> str:
         f"files in {folder}",
     ]
     return "\n".join(lines)
+
+
+def _stress_text(summary: dict) -> list[str]:
+    """The largest stress of all equilibria, a line; none where nothing is loaded."""
+    frame = max(summary["frames"], key=lambda frame: frame["max_von_mises"])
+    peak, unit = frame["peak"], summary["units"]["stress"]
+    if not peak["value"]:
+        return []
+    value = with_error(peak["value"], peak["error"])
+    above = f"; near {', '.join(peak['left_out'])} elements show more" if peak["left_out"] else ""
+    where = f"{frame['configuration']} at {frame['force']:.4g}"
+    return [f"{where}: largest stress {value} {unit} in {peak['link']!r} at {point_text(peak['place'])}{above}"]
+
+
+def _safety_text(summary: dict) -> list[str]:
+    """The least factor of safety of all equilibria, a line; none where it is not known or nothing is loaded."""
+    known = [frame for frame in summary["frames"] if frame["safety"] and frame["safety"]["factor"] is not None]
+    if not known:
+        return []
+    least = min(known, key=lambda frame: frame["safety"]["factor"])
+    return [f"{least['configuration']} at {least['force']:.4g}: {least['safety']['text']}"]
 
 
 def _design_text(summary: dict) -> list[str]:

@@ -36,9 +36,11 @@ LAYERS = (
     "model",
     "quantities",
     "estimates",
+    "stress",
     "simulation",
     "design",
     "report",
+    "live",
 )
 
 # Libraries that belong to a few layers only: descriptions and joints know no elements, only one layer makes meshes,

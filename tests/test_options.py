@@ -27,6 +27,10 @@ RECORDS = (
     fm.Scatter,
     fm.MeshQuality,
     fm.DoubtOptions,
+    fm.StressOptions,
+    fm.RecoveryOptions,
+    fm.InterpolationOptions,
+    fm.SingularityOptions,
     AccuracyOptions,
     RestSearch,
 )

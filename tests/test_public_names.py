@@ -27,7 +27,7 @@ INNER = {
     "Equilibrium",
     "Estimates",
     "HandlePlacement",
-    "IdleSpin",
+    "Spin",
     "InterfaceMap",
     "Iterate",
     "JointSystem",
@@ -41,13 +41,16 @@ INNER = {
     "ParametricShape",
     "PathPlane",
     "PointLoad",
+    "PowerSums",
     "Quadratic",
     "Residual",
     "RigidSpace",
     "Stability",
     "Start",
     "Step",
+    "StressRecovery",
     "Trial",
+    "TurningLink",
 }
 
 

@@ -179,7 +179,8 @@ class AugmentedLagrangianSolver(EquilibriumSolver):
         right.array_w[system.blocks.multipliers.local.start :] = 0.0
         shift, following = minimum_shift, max(_LEAST_SHIFT, last / 3.0)
         for _ in range(20):
-            x = self.try_solve(right, self.step_accuracy(residual)) if self.factor(shift) else None
+            factored = self.factor(shift, least=shift == minimum_shift)
+            x = self.try_solve(right, self.step_accuracy(residual)) if factored else None
             if x is not None and self.descends():
                 break
             shift, following = following, 8.0 * following

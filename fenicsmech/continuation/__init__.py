@@ -7,7 +7,14 @@
 - ``eigen``: the softest modes of a KKT matrix, and buckling loads
 """
 
-from fenicsmech.continuation.arc_length import ArcLengthStepper, ArcSteps, Finish, equilibrium_at, linear_reach
+from fenicsmech.continuation.arc_length import (
+    ArcLengthStepper,
+    ArcSteps,
+    Finish,
+    equilibrium_at,
+    follow_to,
+    linear_reach,
+)
 from fenicsmech.continuation.critical import Critical, CriticalPoint, Sense, crossing, locate, null_space
 from fenicsmech.continuation.eigen import Mode, critical_changes, softest_modes
 from fenicsmech.continuation.load_steps import DeadCentreStepper, LeastShifts, LoadStepper, LoadSteps, LoadStepsFailed

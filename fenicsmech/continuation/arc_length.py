@@ -1,9 +1,10 @@
 """Arc-length continuation: steps along a path that may turn back in load and in displacement.
 
 An equilibrium is predicted along the tangent y′ and its curvature, corrected in the plane ⟨y₁′, y₂ − y⟩ = 0 through the
-prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows. The only fallback
-is half the step, as long as that is not the shortest one: with the default lengths, seventeen tries at most. A try is
-one solve, and one for each of the ``bisections`` if it may go round a corner or jump.
+prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows. The fallback is
+half the step, as long as that is not the shortest one, with plain steps and then, from there on, with those that turn
+links: with the default lengths, seventeen tries of each at most. A try is one solve, and one for each of the
+``bisections`` if it may go round a corner or jump.
 
 Where other points come to touch an obstacle, the stiffness jumps and the path has a corner. What tells it from a bend
 and from a jump to another branch is the step bisected towards the larger turn: a bend turns less in each half, and the
@@ -27,7 +28,8 @@ from fenicsmech.equilibrium import (
     DisplacementControl,
     EquilibriumPoint,
     EquilibriumSolver,
-    LoadControl,
+    FollowedControl,
+    LoadFactorControl,
     MotorControl,
     NotConverged,
     State,
@@ -37,6 +39,7 @@ from fenicsmech.errors import DescriptionError, set_options
 from fenicsmech.log import logger
 
 _log = logger(__name__)
+_AT_END = 1e-10  # of a finish's scale, that counts as its end
 
 
 @dataclass(frozen=True)
@@ -92,20 +95,23 @@ class ArcSteps:
 
 @dataclass(frozen=True)
 class Finish:
-    """A quantity that ends a path at ``end``: its value at a point, its rate along the path, and its scale."""
+    """A quantity that ends a path at ``end``: its value at a point, its rate along the path, its scale, and the
+    control that prescribes the end; None if there is none."""
 
     value: Callable[[EquilibriumPoint], float]
     rate: Callable[[EquilibriumPoint], float]
     end: float
     scale: float
+    control: FollowedControl | DisplacementControl | None = None
 
     def passed(self, before: EquilibriumPoint, after: EquilibriumPoint) -> bool:
         """Whether the end lies between two neighbouring points."""
         a, b = self.value(before) - self.end, self.value(after) - self.end
-        return a * b < 0.0 or (b == 0.0 and a != 0.0)
+        # a path that goes on from an end begins within the tolerance of its location
+        return abs(a) > _AT_END * self.scale and (a * b < 0.0 or b == 0.0)
 
 
-def equilibrium_at(solver: EquilibriumSolver, followed: LoadControl | MotorControl, state: State) -> EquilibriumPoint:
+def equilibrium_at(solver: EquilibriumSolver, followed: FollowedControl, state: State) -> EquilibriumPoint:
     """The point at an equilibrium, with its tangent by the followed value.
 
     Raises:
@@ -119,6 +125,52 @@ def linear_reach(point: EquilibriumPoint, *, value: float | None, conjugate: flo
     """Change of the followed value with which a linear mechanism reaches the first of two changes; infinite if none."""
     speed = abs(point.conjugate_rate)
     return min(abs(value) if value else math.inf, abs(conjugate) / speed if conjugate and speed else math.inf)
+
+
+def follow_to(
+    solver: EquilibriumSolver,
+    start: State,
+    control: MotorControl | LoadFactorControl,
+    steps: ArcSteps,
+    *,
+    most: int,
+    past_turns: bool = False,
+) -> tuple[EquilibriumPoint, int, bool]:
+    """The equilibrium at the prescribed value, on the path from ``start``, the iterations on the way, and whether the
+    path turns back on it.
+
+    Args:
+        solver: for the equilibria.
+        start: an equilibrium.
+        control: of the motors, or of constant loads.
+        steps: options of the steps.
+        most: number of them.
+        past_turns: whether the path may turn back on the way; then the equilibrium is the first stable one.
+
+    Raises:
+        NotConverged: the path ends or, unless it may, turns back before, or the steps do not suffice.
+    """
+    ahead, iterations = control.prescribed - agreed(solver.system.comm, control.value(solver.system, start)), 0
+    if not ahead:
+        raise NotConverged("the path starts where it is to end", iterations)
+    path = ArcLengthStepper(solver, control, start, steps=steps, value=abs(ahead), conjugate=None)
+    finish = Finish(path.value, path.value_rate, control.prescribed, abs(ahead))
+    begun, turned = path.start.scaled(math.copysign(1.0, ahead)), False
+    while most > 0:
+        for before, last in path.follow(begun, [finish], most=most):
+            iterations, most = iterations + last.iterations, most - 1
+            turns = path.value_rate(last) * ahead <= 0.0 or (path.value(last) - path.value(before)) * ahead <= 0.0
+            if turns and not past_turns:
+                raise NotConverged(f"the path turns back near {path.value(before):.6g}", iterations)
+            turned = turned or turns
+        if abs(path.value(last) - control.prescribed) > 1e-6 * abs(ahead):
+            break
+        found = solver.solve(last.state, control)
+        iterations += found.iterations
+        if not (past_turns and found.unstable_modes):
+            return found, iterations, turned
+        begun = last
+    raise NotConverged(f"the path got to {path.value(last):.6g} in as many steps as it may", iterations)
 
 
 class ArcLengthStepper(Stepper):
@@ -146,7 +198,7 @@ class ArcLengthStepper(Stepper):
     def __init__(
         self,
         solver: EquilibriumSolver,
-        followed: LoadControl | MotorControl,
+        followed: FollowedControl,
         state: State,
         *,
         steps: ArcSteps,
@@ -183,7 +235,7 @@ class ArcLengthStepper(Stepper):
         """
         return self.solver.solve(guess, ArcLengthControl(0.0, self.metric, guess, normal, self.local_parameter(near)))
 
-    def local_parameter(self, near: EquilibriumPoint) -> LoadControl | DisplacementControl | MotorControl:
+    def local_parameter(self, near: EquilibriumPoint) -> FollowedControl | DisplacementControl:
         """The control that leaves K regular: of the value or its conjugate, whichever changes more along the path."""
         conjugate = abs(near.conjugate_rate) / self.metric.conjugate
         if self.followed.opposite and conjugate > abs(self.value_rate(near)) / self.metric.value:
@@ -244,7 +296,9 @@ class ArcLengthStepper(Stepper):
                 reason = str(failure)
             self.length *= 0.5
             if self.length < steps.smallest * min(longest / steps.largest, 1.0):
-                raise NotConverged(reason)
+                if not self._turn_links():
+                    raise NotConverged(reason)
+                self.length = longest
 
     def _stays_on_path(self, start: EquilibriumPoint, end: EquilibriumPoint, turn: float, touched: bool) -> bool:
         """Whether the path through ``start`` leads to ``end``, with a ``turn`` that steps may have; ``touched`` is
@@ -311,12 +365,13 @@ class ArcLengthStepper(Stepper):
     def _end(self, before: EquilibriumPoint, after: EquilibriumPoint, finish: Finish) -> EquilibriumPoint:
         """The point with the finish's value, or the nearest found, by Newton's method within the step.
 
-        Tolerance: within 1e-10 of the finish's scale and 1e-8 of the change over the step.
+        Tolerance: within 1e-10 of the finish's scale and 1e-8 of the change over the step. Where rounding scatters
+        points by more than that, the value is prescribed.
         """
         width = self.along(before, after)
         low, high = 0.0, width
         change = finish.value(after) - finish.value(before)
-        near, rising = min(1e-10 * finish.scale, 1e-8 * abs(change)), change > 0.0
+        near, rising = min(_AT_END * finish.scale, 1e-8 * abs(change)), change > 0.0
         distance, best = width, after
         for _ in range(30):
             gap = finish.value(best) - finish.end
@@ -330,7 +385,25 @@ class ArcLengthStepper(Stepper):
                 best = self.between(before, after, distance)
             except NotConverged:
                 break
+        if abs(finish.value(best) - finish.end) > near:
+            best = self._prescribed(before, best, finish, self.steps.gap * width)
         reached = finish.value(best)
         if abs(reached - finish.end) > 1e-6 * abs(change):
             _log.warning("the path ends at %g, not at %g: no equilibrium was found there", reached, finish.end)
         return best
+
+    def _prescribed(
+        self, before: EquilibriumPoint, near: EquilibriumPoint, finish: Finish, farthest: float
+    ) -> EquilibriumPoint:
+        """The point at which the finish's control prescribes its end; ``near`` if there is none, or only ``farthest``
+        away."""
+        if finish.control is None:
+            return near
+        try:
+            found = self.solver.solve(near.state, finish.control)
+            if self.metric.norm(self.chord(near, found)) > farthest:
+                return near
+            plane = ArcLengthControl(0.0, self.metric, found.state, before.tangent, self.local_parameter(near))
+            return self.solver.linearise(found.state, plane).point(found.residuals, found.iterations)
+        except NotConverged:
+            return near

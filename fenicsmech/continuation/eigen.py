@@ -26,15 +26,7 @@ import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from fenicsmech.equilibrium import (
-    EquilibriumSolver,
-    EquilibriumSystem,
-    LoadControl,
-    MotorControl,
-    NotConverged,
-    State,
-    Step,
-)
+from fenicsmech.equilibrium import EquilibriumSolver, EquilibriumSystem, FollowedControl, NotConverged, State, Step
 
 
 @dataclass(frozen=True)
@@ -45,9 +37,7 @@ class Mode:
     step: Step
 
 
-def softest_modes(
-    solver: EquilibriumSolver, held: LoadControl | MotorControl, state: State, *, count: int
-) -> list[Mode]:
+def softest_modes(solver: EquilibriumSolver, held: FollowedControl, state: State, *, count: int) -> list[Mode]:
     """The ``count`` modes with the stiffnesses μ nearest to zero under the control ``held``, nearest first.
 
     Stiffnesses are in units of the mean stiffness of the links; negative ones are unstable.
@@ -63,9 +53,7 @@ def softest_modes(
     return _largest(solver.system, mask.local_size, apply, count)
 
 
-def critical_changes(
-    solver: EquilibriumSolver, held: LoadControl | MotorControl, state: State, *, count: int
-) -> list[Mode]:
+def critical_changes(solver: EquilibriumSolver, held: FollowedControl, state: State, *, count: int) -> list[Mode]:
     """The ``count`` changes Δ of a control's value that make the KKT matrix singular, nearest first.
 
     Both senses count. Exact to second order in Δ.
@@ -109,7 +97,7 @@ def critical_changes(
     return [Mode(unit * mode.value, mode.step) for mode in modes]
 
 
-def _kkt_matrix(solver: EquilibriumSolver, control: LoadControl | MotorControl, state: State) -> PETSc.Mat:
+def _kkt_matrix(solver: EquilibriumSolver, control: FollowedControl, state: State) -> PETSc.Mat:
     """A copy of K at a loaded state."""
     solver.system.linearise(state, control, solver.system.residual(state, control))
     return solver.system.kkt.matrix().copy()

@@ -18,8 +18,24 @@ the same on all processes and machines, and not by time:
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
     5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
     6. half the step                                           ``LoadSteps.smallest``, or ``failures`` in a row
-    7. of motors and constant loads: links that strain         ten halvings; then load steps once more
+    7. steps that turn links (``equilibrium.turning``), 1 to   as these; from then on, all steps are such
+       6 from the whole way on
+    8. the nearest equilibrium found past a fold, a snap       one
+    9. of motors and constant loads: links that strain         ten halvings; then load steps once more
        beyond a dead centre
+    10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
+       may have left at a corner
+    11. of constant loads: the path by arc length from half    ``LoadSteps.arc_steps``
+       of those reached, past its turns, to the first
+       stable equilibrium under all
+    12. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
+       which they balance with springs
+    13. of curves that have snapped: load steps from rest to    as these
+       the value, whose path may go on where that snapped
+       to ends
+    14. of forces beside large reactions: one solve to a       as one solve
+       smaller residual, where motions that deform no link
+       are out of balance
 
 Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
 a dead load the equilibria past a limit point are not those that the mechanism would take.
@@ -74,10 +90,11 @@ class LoadSteps:
         smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap.
         fold_growth: growth of the tangent over the last step from which the path counts as turning back.
         fold_ahead: largest distance ahead at which it does, over the last step that failed.
-        minimum_shift: least shift of the KKT matrix, in units of the mean stiffness, where a mechanism has zero-energy
+        minimum_shift: least shift of the KKT matrix, in units of links' stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
             forces hold zero-energy modes with a smaller stiffness.
+        arc_steps: most arc-length steps of motors, and of constant loads.
 
     Raises:
         DescriptionError: a number is not positive, a factor is negative, or the number of iterations not whole.
@@ -98,9 +115,10 @@ class LoadSteps:
     fold_ahead: float = 4.0
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
+    arc_steps: int = 300
 
     def __post_init__(self) -> None:
-        set_options(self, "load steps", failures=1, iterations=1)
+        set_options(self, "load steps", failures=1, iterations=1, arc_steps=1)
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 
@@ -115,7 +133,7 @@ class LoadSteps:
 
 @dataclass(frozen=True)
 class LeastShifts:
-    """Least shifts of the KKT matrix, in the order in which they are tried, in units of the mean stiffness.
+    """Least shifts of the KKT matrix, in the order in which they are tried, in units of the links' stiffness.
 
     Attributes:
         at_start: at the value at which steps begin.
@@ -192,6 +210,7 @@ class LoadStepper(Stepper):
             self._settle(control.at(self._value))
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
+        beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
         while True:
             remaining = control.prescribed - self._value
             step = self._limited(step, distance)
@@ -199,27 +218,35 @@ class LoadStepper(Stepper):
             value = control.prescribed if arrives else self._value + step
             try:
                 point = self._correct(self._guess(control.at(value)), control.at(value))
+                snapped = self._snapped(point)
+                if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
+                    step, beyond = 0.5 * (value - self._value), point
+                    continue
             except NotConverged as failure:
                 tried.append(value)
                 failed += 1
                 step = 0.5 * (value - self._value)
-                if abs(step) <= steps.smallest * self._scale(distance) or failed == steps.failures:
+                if abs(step) > steps.smallest * self._scale(distance) and failed < steps.failures:
+                    continue
+                if self._turn_links():
+                    step, failed = remaining, 0
+                    continue
+                if beyond is None:
                     fold = self._fold(tried[-1])
                     raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
-                continue
-            if self._snapped(point):
-                if abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
-                    step = 0.5 * (value - self._value)
-                    continue
+                point, snapped, step = beyond, True, beyond.control.prescribed - self._value
+            if snapped:
                 self.snaps += 1
                 self._rate = None
                 _log.warning(
-                    "between %g and %g the path turns back; the next equilibria are on another one", self._value, value
+                    "between %g and %g the path turns back; the next equilibria are on another one",
+                    self._value,
+                    point.control.prescribed,
                 )
             self._accept_at(point)
-            if arrives:
+            if self._value == control.prescribed:
                 return point
-            failed = 0
+            failed, beyond = 0, None
             if point.iterations <= steps.iterations:
                 step *= 2.0
 
@@ -335,7 +362,7 @@ class LoadStepper(Stepper):
         system, last, steps = self.system, self._points[-1], self._steps
         before = last.tangent if self._rate is None else last.tangent.slower(self._rate)
         rate = system.difference(point.state, last.state).scaled(1.0 / distance)
-        beyond = self._beyond(rate, (before, point.tangent, point.tangent.scaled(steps.branching_rate)))
+        beyond = self._beyond(rate, (before, point.tangent, point.tangent.scaled(steps.branching_rate)), point)
         largest = max(system.size(before), system.size(point.tangent))
         grown = system.size(last.tangent + before.scaled(-1.0)) * abs(distance)
         if (
@@ -346,9 +373,9 @@ class LoadStepper(Stepper):
         self._rate = rate
         return False
 
-    def _beyond(self, rate: Step, span: tuple[Step, ...]) -> float:
-        """Distance of ``rate`` from the ``span`` of others, without nodes that bodies move."""
-        return self.system.size(self.system.independent(rate.beyond(span)))
+    def _beyond(self, rate: Step, span: tuple[Step, ...], point: EquilibriumPoint) -> float:
+        """Distance of ``rate`` to ``point`` from the ``span`` of others, where the motion is independent."""
+        return self.system.size(self.system.independent(rate.beyond(span), point.state))
 
     def _accept_at(self, point: EquilibriumPoint) -> None:
         """Keeps ``point``, at the value of its control."""
@@ -396,7 +423,7 @@ class DeadCentreStepper(LoadStepper):
         its ends."""
         rate = self.system.difference(point.state, last.state).scaled(1.0 / step)
         largest = max(self.system.size(straining), self.system.size(point.tangent))
-        return self._beyond(rate, (straining, last.tangent, point.tangent)) > self._steps.deviation * largest
+        return self._beyond(rate, (straining, last.tangent, point.tangent), point) > self._steps.deviation * largest
 
     def _straining_rate(self, last: EquilibriumPoint, control: Control) -> Step:
         """Rate of the state with the value of ``control`` that strains links instead of the dominant motion x.

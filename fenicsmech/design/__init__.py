@@ -6,14 +6,23 @@ from scattered starts ends in several. Its ``objective`` compares the quantities
 ``equilibria`` with the wanted values, and adds ``regularisers``. The ``rest_shape`` of the links follows the parameters
 through ``shape``: ``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of
 these, and the ``handle_optimum`` of the mesh ``quality``; ``numbers`` of parts may change in addition.
-``characterisation`` fits Young's modulus to measurements.
+``characterisation`` fits Young's modulus and other parameters to load–displacement curves, ``law_fit`` parameters of
+laws to tests of specimens, with the intervals of ``regression``.
 """
 
-from fenicsmech.design.characterisation import Experiment, ModulusFit, fit_modulus
+from fenicsmech.design.characterisation import (
+    Experiment,
+    ModulusFit,
+    ParameterFit,
+    ParameterFitOptions,
+    fit_modulus,
+    fit_parameters,
+)
 from fenicsmech.design.correction import Correction
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request, with_followers
-from fenicsmech.design.design_problem import DesignProblem
+from fenicsmech.design.design_problem import DesignLinearisation, DesignProblem
 from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
+from fenicsmech.design.law_fit import LawFit, LawFitOptions, SpecimenTest, fit_law
 from fenicsmech.design.numbers import Number, NumberDesign, ScaledNumbers
 from fenicsmech.design.objective import Objective, group_count, sample_numbers, split
 from fenicsmech.design.optimisers.bfgs import BFGS
@@ -36,10 +45,10 @@ from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, Model, NumberBounds, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
-from fenicsmech.design.run import Checkpoint, DesignProgress, Round, minimise_together
+from fenicsmech.design.run import Checkpoint, DesignIterate, DesignProgress, Round, minimise_together
 from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
 from fenicsmech.design.shape.edges import MidEdgeNodes, edge_weights
-from fenicsmech.design.shape.handle_optimum import HandleOptimum, ShapeError, follow_spline, motion
+from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError, follow_spline, motion
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkParameters, ShapeMap, ShapeRequest, shape_link, shape_links

@@ -31,7 +31,7 @@ from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers.problem import Infeasible, Iterate, Optimiser, Reason, Start
 from fenicsmech.design.result import DesignResult, Reached
-from fenicsmech.design.run import Checkpoint, DesignProgress, Optimum, Round, Saved, minimise_together
+from fenicsmech.design.run import Checkpoint, DesignIterate, DesignProgress, Optimum, Round, Saved, minimise_together
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Comparison, check_sensitivities
 from fenicsmech.design.transfer import WholeState
@@ -51,7 +51,8 @@ class Correction:
         estimates: whether error estimates are added; without, targets are met on the mesh of the simulation alone.
         change: largest change of a correction in the last round, over the target's scale: a tenth of the per cent
             within which targets count as met.
-        resolved: the same over the component's error estimate, which is itself uncertain by as much.
+        resolved: the same over the component's error estimate, which is itself uncertain by as much; of smoothed
+            extremes ``change`` or their own resolution counts.
         contraction: change of corrections over that of the round before. A surrogate whose ratio is larger in two
             rounds in a row is given up, since the gradient of the simulation itself leads to the optimum faster; a
             single round may exceed it, by ending at another design. Where changes grow, the surrogate is given up
@@ -181,7 +182,9 @@ def correct(
             return last
         needed, scales = reached.compared - objective.reached, objective.comparison.scale_of
         off = np.abs(needed - round.correction)
-        change = float(np.max(off / np.maximum(options.change * scales, options.resolved * np.abs(reached.errors))))
+        uncertain = np.where(objective.comparison.smoothed, 0.0, options.resolved * np.abs(reached.errors))
+        enough = np.maximum(options.change, objective.comparison.resolution) * scales
+        change = float(np.max(off / np.maximum(enough, uncertain)))
         round = replace(
             round,
             correction=tuple(needed.tolist()),
@@ -230,6 +233,7 @@ class CorrectedRun:
         start: initial design.
         saved: the checkpoint, if one is written.
         found: content of the checkpoint, saved by the run that this one continues.
+        watch: called with every iterate on the first process.
     """
 
     def __init__(
@@ -237,11 +241,12 @@ class CorrectedRun:
         problem: DesignedSimulation,
         optimiser: Optimiser,
         correction: Correction,
-        start: DesignResult | np.ndarray | None,
+        start: DesignResult | HandlePlacement | np.ndarray | None,
         saved: Checkpoint | None,
         found: Saved | None,
+        watch: Callable[[DesignIterate], None] | None,
     ) -> None:
-        self._problem, self._optimiser, self._options = problem, optimiser, correction
+        self._problem, self._optimiser, self._options, self._watch = problem, optimiser, correction, watch
         self._start, self._saved, self._found = start, saved, found
         self._comm = problem.simulation.comm
         self._nothing = Round(False, (0.0,) * Comparison(problem.targets, problem.simulation.scene.units).size)
@@ -306,6 +311,10 @@ class CorrectedRun:
         try:
             end = self._rounds(problem, *(self._next or self._beginning(problem, self._nothing)), truth)
         except Infeasible as failure:
+            # rank 0 alone knows the cause
+            shape = self._comm.bcast(failure.__cause__ if isinstance(failure.__cause__, ShapeError) else None, root=0)
+            if shape is not None:
+                raise shape from None
             raise EquilibriumError(
                 f"design of {problem.simulation.scene.mechanism.name!r}",
                 f"the design to start from has no value: {failure}",
@@ -372,6 +381,8 @@ class CorrectedRun:
             if self._saved is not None:
                 self._saved.save(iterate, objective.placement.theta, round, self._optimiser)
             progress.update(iterate, errors)
+            if self._watch is not None:
+                self._watch(DesignIterate(iterate.number, objective.placement, objective.compared, errors))
 
         name = f"design, {space}" if number == 1 else f"design, {space}, round {number}"
         with DesignProgress(self._optimiser, leads=self._comm.rank == 0, name=name) as progress:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -19,11 +19,12 @@ from fenicsmech.design.description import SplineDesign, check_designs
 from fenicsmech.design.designed import DesignedSimulation
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.optimisers.levenberg_marquardt import LevenbergMarquardt
-from fenicsmech.design.optimisers.problem import Optimiser
+from fenicsmech.design.optimisers.problem import Infeasible, Optimiser, Quadratic
 from fenicsmech.design.optimisers.sqp import SQP
 from fenicsmech.design.regularisers import MeshQuality, NumberBounds, Regulariser, ShapeBounds, StayClose
 from fenicsmech.design.result import (
     DesignResult,
+    LinkDesign,
     draw_links,
     link_designs,
     rest_meshes,
@@ -31,12 +32,12 @@ from fenicsmech.design.result import (
     write_parts,
     write_solids,
 )
-from fenicsmech.design.run import Checkpoint, fingerprint
+from fenicsmech.design.run import Checkpoint, DesignIterate, fingerprint
 from fenicsmech.design.search import Scatter, Search, SearchResult
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
 from fenicsmech.design.verification import part_simulations, placed_points, verified_parts
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, EquilibriumError
 from fenicsmech.log import Clock, logger
 from fenicsmech.mechanism import FlexibleLink, Joint
 from fenicsmech.meshing import LinkMesh
@@ -49,6 +50,36 @@ _log = logger(__name__)
 
 DEFAULT_REGULARISER = MeshQuality() + ShapeBounds() + NumberBounds() + 1e-4 * StayClose()
 DEFAULT_CORRECTION = Correction()
+
+
+@dataclass(frozen=True, eq=False)
+class DesignLinearisation:
+    """The targets' quantities near one design.
+
+        Q(p + s) ≈ Q + e + J s,     R(p + s) ≈ R + ∂R/∂p s + ½ sᵀ ∂²R/∂p² s
+
+    Attributes:
+        placement: parameters p and handle positions.
+        links: shapes of the links.
+        lengths: typical change of each parameter, (parameters,).
+        values: Q, (components,).
+        errors: e, estimated discretisation errors, to be added, (components,).
+        jacobian: J, (components, parameters).
+        regulariser: R.
+        active: the bounds that hold the design back, in words.
+        entries: the parameter that each component of each link's control points is, −1 where it is none, as
+            ``LinkDesign.controls``.
+    """
+
+    placement: HandlePlacement
+    links: tuple[LinkDesign, ...]
+    lengths: np.ndarray
+    values: np.ndarray
+    errors: np.ndarray
+    jacobian: np.ndarray
+    regulariser: Quadratic
+    active: tuple[str, ...]
+    entries: tuple[np.ndarray, ...]
 
 
 class DesignProblem:
@@ -92,8 +123,61 @@ class DesignProblem:
         """Parameters of the drawn design, (parameters,): those of shapes, then of numbers, in the order given."""
         return self._own.rest.initial
 
-    def rest_shape(self, design: DesignResult | np.ndarray) -> Design:
-        """The design of a result or of parameters (parameters,), as ``Simulation.with_design`` takes it.
+    def with_targets(self, targets: Sequence[Target]) -> DesignProblem:
+        """The same problem with other targets; handles, weights and the last equilibria from zero load are shared.
+
+        Raises:
+            DescriptionError: a target belongs to another mechanism.
+            AssemblyError: its configuration does not assemble.
+        """
+        other = DesignProblem(self.simulation, self.designs, targets=targets, regulariser=self.regulariser)
+        other._own, other._clock = self._own.with_targets(targets), self._clock
+        return other
+
+    def linearise(self, design: DesignResult | HandlePlacement | np.ndarray) -> DesignLinearisation:
+        """Values of all targets' quantities at a design, and their derivatives with respect to its parameters.
+
+        Raises:
+            DescriptionError: the design belongs to other links.
+            ShapeError: cells of the mesh are inverted in this shape, or a number is out of its bounds.
+            EquilibriumError: a target's equilibrium is not found, or is unstable.
+        """
+        own, rest, model = self._own, self._own.rest, self.simulation.model
+        parameters, near = own.given(design)
+        with model.shaped(model.design):
+            placement = rest.place(parameters, near)
+            try:
+                solved = own.loaded.from_zero()
+            except Infeasible as failure:
+                raise EquilibriumError(
+                    f"design of {self.simulation.scene.mechanism.name!r}", str(failure), "Give smaller loads"
+                ) from failure
+            own.loaded.keep(solved)
+            return DesignLinearisation(
+                placement=placement,
+                links=link_designs(rest, placement),
+                lengths=rest.lengths,
+                values=own.loaded.values(solved),
+                errors=own.loaded.errors(solved),
+                jacobian=rest.slopes(placement, own.loaded.gradients(solved)),
+                regulariser=self.regulariser.around(rest, placement)(parameters),
+                active=self.regulariser.active(rest, placement),
+                entries=tuple(link.entries for link in rest.links),
+            )
+
+    def placement(self, design: DesignResult | HandlePlacement | np.ndarray) -> HandlePlacement:
+        """Parameters and handle positions of a design.
+
+        Raises:
+            DescriptionError: the design belongs to other links.
+            ShapeError: cells of the mesh are inverted in this shape.
+        """
+        rest, model = self._own.rest, self.simulation.model
+        with model.shaped(model.design):
+            return rest.place(*self._own.given(design))
+
+    def rest_shape(self, design: DesignResult | HandlePlacement | np.ndarray) -> Design:
+        """The design of a result, a placement or parameters (parameters,), as ``Simulation.with_design`` takes it.
 
         Parameters alone need not fix the shape: several positions of the handles can be minima, and results hold those
         found.
@@ -108,11 +192,12 @@ class DesignProblem:
         self,
         *,
         optimiser: Optimiser | None = None,
-        start: DesignResult | np.ndarray | None = None,
+        start: DesignResult | HandlePlacement | np.ndarray | None = None,
         surrogate: Simulation | Literal["plane-stress"] | None = "plane-stress",
         correction: Correction = DEFAULT_CORRECTION,
         checkpoint: str | Path | None = None,
         resume: bool = False,
+        watch: Callable[[DesignIterate], None] | None = None,
     ) -> DesignResult:
         """The best design; the simulation stays as it is.
 
@@ -122,19 +207,21 @@ class DesignProblem:
         Args:
             optimiser: by default Levenberg–Marquardt where every target equals something, else sequential quadratic
                 programming.
-            start: initial design, such as the result of a cheaper simulation, or parameters (parameters,); the drawn
-                shapes by default.
+            start: initial design, such as the result of a cheaper simulation, or the placement of an iterate, or
+                parameters (parameters,); the drawn shapes by default.
             surrogate: a cheaper simulation of the same scene that is minimised in place of this one, with corrections
                 to the values of this one. By default, for a simulation in 3D, one in plane stress if the scene allows
                 it; None: this simulation itself is minimised.
             correction: of the values that are compared with targets.
             checkpoint: file updated after each iteration.
             resume: whether to continue from ``checkpoint`` if it exists.
+            watch: called with every iterate, on the first process; the optimisation ends by what it raises.
 
         Raises:
             DescriptionError: the checkpoint or the start belongs to another problem, or no shape that may change moves
                 the point of a target.
             EquilibriumError: the initial design does not carry its loads.
+            ShapeError: its mesh does not follow its handles.
         """
         began, clock = perf_counter(), dict(self._clock.seconds)
         comm, cheaper = self.simulation.comm, self._surrogate(surrogate)
@@ -150,7 +237,7 @@ class DesignProblem:
         with ExitStack() as held:
             for model in (own.simulation.model for own in (self._own, cheaper) if own is not None):
                 held.enter_context(model.shaped(model.design))
-            run = CorrectedRun(self._own, optimiser, correction, start, saved, found)
+            run = CorrectedRun(self._own, optimiser, correction, start, saved, found, watch)
             end = run.from_surrogate(cheaper) or run.directly()
             reached, round, (group, objective) = end.reached, end.round, end.of.team
             compared = objective.comparison
@@ -240,7 +327,11 @@ class DesignProblem:
         )
 
     def export(
-        self, folder: str | Path, design: DesignResult | np.ndarray, *, pin_diameter: float | None = None
+        self,
+        folder: str | Path,
+        design: DesignResult | HandlePlacement | np.ndarray,
+        *,
+        pin_diameter: float | None = None,
     ) -> None:
         """Writes ``NAME.step`` and ``NAME.stl`` of every link whose shape or depth may change, in mm.
 

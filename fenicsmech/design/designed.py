@@ -74,6 +74,13 @@ class DesignedSimulation:
                 "design problem", f"files of {' and '.join(map(repr, twice))} have one name", "Rename one of the links"
             )
         self._requests = shape_requests(self.shapes, simulation, self.numbers)
+        self._like: DesignedSimulation | None = None
+
+    def with_targets(self, targets: Sequence[Target]) -> DesignedSimulation:
+        """The same with other targets, which shares handles, weights and compiled sensitivities."""
+        other = DesignedSimulation(self.simulation, self.designs, targets, self._regulariser, self.clock)
+        other._like = self
+        return other
 
     def on(self, simulation: Simulation) -> DesignedSimulation:
         """The same in another simulation."""
@@ -117,12 +124,15 @@ class DesignedSimulation:
     @cached_property
     def rest(self) -> ParametricShape:
         """The rest shape of the links that change."""
+        if self._like is not None:
+            return self._like.rest
         return ParametricShape(self.simulation.model, self._shapes, self.shapes, self.numbers)
 
     @cached_property
     def loaded(self) -> SampleEquilibria:
         """The equilibria of all targets, of all processes together."""
-        return SampleEquilibria(self.simulation, self.targets, numbers=self._kinds)
+        like = None if self._like is None else self._like.loaded
+        return SampleEquilibria(self.simulation, self.targets, numbers=self._kinds, like=like)
 
     @property
     def _kinds(self) -> list[NumberKind]:
@@ -134,7 +144,10 @@ class DesignedSimulation:
         rest = self.rest
         with self.clock.phase("setup"):
             group, simulation = split(self.simulation.comm, sample_numbers(self.targets)), self.simulation
-            if group.comm is not simulation.comm:
+            like: SampleEquilibria | None = None
+            if group.comm is simulation.comm:
+                like = self.loaded
+            else:
                 simulation = simulation.on(group.comm)
                 rest = ParametricShape(simulation.model, self._shapes, self.shapes, self.numbers)
             mine = [self.targets[k] for k in group.mine]
@@ -142,19 +155,22 @@ class DesignedSimulation:
             # mostly is refused
             options, comm = FollowOptions(halvings=0), self.simulation.comm
             # a point of one group's targets may be off its link
-            equilibria = on_all(comm, lambda: SampleEquilibria(simulation, mine, options, numbers=self._kinds))
+            equilibria = on_all(comm, lambda: SampleEquilibria(simulation, mine, options, self._kinds, like))
             comparison = Comparison(self.targets, simulation.scene.units)
             objective = Objective(
                 rest, equilibria, comparison=comparison, regulariser=self._regulariser, group=group, clock=self.clock
             )
         return group, objective
 
-    def given(self, design: DesignResult | np.ndarray) -> tuple[np.ndarray, HandlePlacement | None]:
-        """Parameters of a design, and its handle positions if it is a result.
+    def given(self, design: DesignResult | HandlePlacement | np.ndarray) -> tuple[np.ndarray, HandlePlacement | None]:
+        """Parameters of a design, and its handle positions if they are known.
 
         Raises:
             DescriptionError: the result belongs to other links, or the parameters are not as many finite numbers.
         """
+        if isinstance(design, HandlePlacement):
+            parameters, _ = self.given(design.p)
+            return parameters, self.rest.placement_from(parameters, design.theta)
         if not isinstance(design, DesignResult):
             parameters = np.array(design, dtype=float)
             if parameters.shape != self.rest.initial.shape or not np.all(np.isfinite(parameters)):

@@ -29,6 +29,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenicsmech.collective import agreed
@@ -74,6 +75,8 @@ class FollowOptions:
             configuration: up to 0.3 between plane stress and 3D, more where motors strain links, 2.8 and more across
             folds.
         rounding: misses below this part of the mechanism's length, or rad, are rounding.
+        same_design: distance of two design fields, over the mechanism's length, up to which equilibria that were kept
+            are of both.
 
     Raises:
         DescriptionError: a number is out of its range.
@@ -85,6 +88,7 @@ class FollowOptions:
     largest_transfer_miss: float = 8.0
     farthest_transfer: float = 1.0
     rounding: float = 1e-6
+    same_design: float = 1e-12
 
     def __post_init__(self) -> None:
         set_options(self, "following equilibria", load_steps=1, halvings=0)
@@ -151,6 +155,19 @@ class _Path:
         return DisplacementControl(self.sample.value + origin)
 
 
+class _Shared:
+    """What the equilibria of several sets of targets in one simulation share.
+
+    Attributes:
+        sensitivity: compiled when first needed.
+        kept: the equilibria kept last; None before.
+    """
+
+    def __init__(self, sensitivity: Sensitivity) -> None:
+        self.sensitivity = sensitivity
+        self.kept: DesignEquilibria | None = None
+
+
 class SampleEquilibria:
     """The equilibria of the samples of ``targets`` in one simulation, and the values of their quantities.
 
@@ -159,6 +176,8 @@ class SampleEquilibria:
         targets: whose samples these are.
         options: of following them from design to design.
         numbers: with respect to which derivatives are wanted, in addition to those by the design field.
+        like: those of other targets in the same simulation, with the same numbers; compiled sensitivities and the
+            equilibria kept are shared.
     """
 
     def __init__(
@@ -167,9 +186,11 @@ class SampleEquilibria:
         targets: Sequence[Target],
         options: FollowOptions | None = None,
         numbers: Sequence[NumberKind] = (),
+        like: SampleEquilibria | None = None,
     ) -> None:
         self._simulation, self._model, self._options = simulation, simulation.model, options or FollowOptions()
-        self.targets, self._sensitivity = tuple(targets), Sensitivity(simulation.model, numbers)
+        self.targets = tuple(targets)
+        self._shared: _Shared = like._shared if like else _Shared(Sensitivity(simulation.model, numbers))
         kinds = {target.quantity: target.quantity.on(simulation.model) for target in targets}
         self._observables = [kinds[target.quantity] for target in targets]
         self._at_rest = {k: own for k, own in enumerate(self._observables) if isinstance(own, RestObservable)}
@@ -190,6 +211,24 @@ class SampleEquilibria:
         for samples in self._on_one_path():
             found.update(self._traced(samples))
         return self._at_design({sample: found[sample] for sample in self._paths})
+
+    def keep(self, solved: DesignEquilibria) -> None:
+        """Keeps equilibria, the last ones alone, for ``kept``."""
+        self._shared.kept = solved
+
+    def kept(self) -> DesignEquilibria | None:
+        """Those kept last if they are of the present design, within rounding, and hold all samples; else None."""
+        found, design = self._shared.kept, self._model.design
+        if found is None or any(sample not in found.samples for sample in self._paths):
+            return None
+        apart = float(np.max(np.abs(found.design.field - design.field), initial=0.0))
+        same = (
+            found.design.numbers == design.numbers
+            and apart <= self._options.same_design * self._model.linkage.joints.length
+        )
+        if not self._model.mesh.comm.allreduce(same, op=MPI.LAND):
+            return None
+        return self._at_design({sample: found.samples[sample] for sample in self._paths})
 
     def from_other(self, guesses: Mapping[Sample, WholeState]) -> DesignEquilibria:
         """The equilibria of all samples at the present design, from those of another simulation at the same design.
@@ -234,12 +273,12 @@ class SampleEquilibria:
 
     def gradients(self, solved: DesignEquilibria) -> list[Gradient]:
         """Derivatives of the components at the design that the model holds."""
-        found = {k: [self._sensitivity.at_rest(own)] for k, own in self._at_rest.items()}
+        found = {k: [self._shared.sensitivity.at_rest(own)] for k, own in self._at_rest.items()}
         for path in self._paths.values():
             own = self._of(path.sample)
             at = solved.samples[path.sample]
             places, partials = self._partials(solved, path, at.state, own)
-            loaded = self._sensitivity.of(path.solver, at.state, at.control, partials)
+            loaded = self._shared.sensitivity.of(path.solver, at.state, at.control, partials)
             if path.moves(at.unloaded):
                 loaded = self._less_unloaded(solved, path, places, loaded)
             for k, gradient in zip(places, loaded, strict=True):
@@ -247,18 +286,19 @@ class SampleEquilibria:
         return [gradient for k in range(len(self.targets)) for gradient in found[k]]
 
     def errors(self, solved: DesignEquilibria) -> np.ndarray:
-        """Estimated discretisation errors of the components, to be added, (components,)."""
-        found = {k: [0.0] for k in self._at_rest}
+        """Estimated discretisation errors of the components, to be added, and those of smoothing, (components,)."""
         with self._model.shaped(solved.design):
+            found = {k: own.smoothing_errors(None).tolist() for k, own in self._at_rest.items()}
             for path in self._paths.values():
                 at = solved.samples[path.sample]
                 places, partials = self._partials(solved, path, at.state, self._of(path.sample))
-                adjoints = self._sensitivity.adjoints(path.solver, at.state, at.control, partials)
+                adjoints = self._shared.sensitivity.adjoints(path.solver, at.state, at.control, partials)
                 errors, slopes = self._estimated(adjoints), [own.by_control() if own else 0.0 for own in adjoints]
+                errors = [own + more for own, more in zip(errors, self._smoothing(solved, path), strict=True)]
                 if path.moves(at.unloaded):
                     from_there, counted, prescribed = self._unloaded_partials(solved, path, places)
                     unloaded = self._estimated(
-                        self._sensitivity.adjoints(path.solver, at.unloaded, LoadControl(0.0), from_there)
+                        self._shared.sensitivity.adjoints(path.solver, at.unloaded, LoadControl(0.0), from_there)
                     )
                     for place, error in zip(counted, unloaded, strict=False):
                         errors[place] -= error
@@ -303,6 +343,15 @@ class SampleEquilibria:
                 partials.append(sum((float(s) * part for s, part in pairs if s), start=Partial()))
         return places, partials
 
+    def _smoothing(self, solved: DesignEquilibria, path: _Path) -> list[float]:
+        """Errors of smoothing of the wanted components at a path's sample."""
+        found: list[float] = []
+        for observable, k in self._of(path.sample):
+            target = self.targets[k]
+            _, slopes = target.quantity.reduce(solved.raw[k])
+            found += (slopes[: target.size] @ observable.smoothing_errors(solved.samples[path.sample].state)).tolist()
+        return found
+
     def _unloaded_partials(
         self, solved: DesignEquilibria, path: _Path, places: Sequence[int]
     ) -> tuple[list[Partial], list[int], bool]:
@@ -323,7 +372,7 @@ class SampleEquilibria:
         """Derivatives of components less those in the unloaded configuration."""
         partials, counted, prescribed = self._unloaded_partials(solved, path, places)
         origin = solved.samples[path.sample].unloaded
-        unloaded = self._sensitivity.of(path.solver, origin, LoadControl(0.0), partials)
+        unloaded = self._shared.sensitivity.of(path.solver, origin, LoadControl(0.0), partials)
         found = list(loaded)
         for place, gradient in zip(counted, unloaded, strict=False):
             found[place] = found[place] + -1.0 * gradient

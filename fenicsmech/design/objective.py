@@ -10,7 +10,7 @@ targets with respect to p. Samples are spread over groups of processes, each wit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,7 +85,7 @@ class Objective:
         return self._best.placement
 
     def begin(self, near: HandlePlacement | None, drawn: np.ndarray | None = None) -> None:
-        """Starts afresh: the next evaluation finds its equilibria from zero load.
+        """Starts afresh: the next evaluation has equilibria that were kept of its design, or finds them from zero load.
 
         Args:
             near: handle positions to start from.
@@ -105,7 +105,8 @@ class Objective:
         Raises:
             Infeasible: cells invert, or a target's equilibrium is not found or is unstable.
         """
-        return self._values(on_all(self._group.everyone, lambda: self._solve(parameters, None, near))[2])
+        from_zero = self._equilibria.from_zero
+        return self._values(on_all(self._group.everyone, lambda: self._solve(parameters, near, from_zero))[2])
 
     def evaluate(
         self, parameters: np.ndarray, below: float = np.inf, penalties: np.ndarray | float = 0.0
@@ -122,7 +123,13 @@ class Objective:
             TooHigh: the merit is above ``below``; derivatives were not computed.
         """
         everyone = self._group.everyone
-        placement, model, solved = on_all(everyone, lambda: self._solve(parameters, self._base, self._near))
+        base, equilibria = self._base, self._equilibria
+        near = base.placement if base else self._near
+
+        def find() -> DesignEquilibria:
+            return equilibria.from_design(base.solved) if base else equilibria.kept() or equilibria.from_zero()
+
+        placement, model, solved = on_all(everyone, lambda: self._solve(parameters, near, find))
         reached = self._values(solved)
         if not self._scaled:
             self.comparison, self._scaled = self.comparison.relative_to(reached), True
@@ -141,6 +148,8 @@ class Objective:
             except ShapeError as error:
                 raise Infeasible(str(error)) from error
         self._base = _Base(placement, solved)
+        if base is None:  # those followed from design to design may be on paths that loads do not reach
+            equilibria.keep(solved)
         self.reached, self._rows = reached, rows
         by_residuals, by_plain, by_inequalities = compared.slopes(rows)
         return Evaluation(
@@ -190,18 +199,18 @@ class Objective:
         return self._gathered(self._equilibria.values(solved)[:, None])[:, 0]
 
     def _solve(
-        self, parameters: np.ndarray, base: _Base | None, near: HandlePlacement | None
+        self, parameters: np.ndarray, near: HandlePlacement | None, find: Callable[[], DesignEquilibria]
     ) -> tuple[HandlePlacement, Model, DesignEquilibria]:
-        """Handle placement, model of R and this group's equilibria, from those of ``base``, else ``near`` and zero."""
+        """Handle placement, from the one ``near``, model of R, and the equilibria of this group."""
         with self._clock.phase("handles"):
             try:
-                placement = self._rest.place(parameters, base.placement if base else near)
+                placement = self._rest.place(parameters, near)
             except ShapeError as error:
                 raise Infeasible(str(error)) from error
         with self._clock.phase("regularisers"):
             model = self._regulariser.around(self._rest, placement)
         with self._clock.phase("equilibria"):
-            solved = self._equilibria.from_design(base.solved) if base else self._equilibria.from_zero()
+            solved = find()
         return placement, model, solved
 
     def _gathered(self, rows: np.ndarray) -> np.ndarray:

@@ -64,6 +64,15 @@ class DesignedLink:
     follows: bool = False
 
     @property
+    def entries(self) -> np.ndarray:
+        """The entry of p that each component of its control points is, −1 where it is none, (points, 2, 3)."""
+        found = np.full(self.spline.controls.shape, -1)
+        if not self.follows:
+            own = self.spline.entries[self.spline.of_shape]
+            found.ravel()[own] = np.arange(self.parameters.place.start, self.parameters.place.stop)
+        return found
+
+    @property
     def is_thickness(self) -> np.ndarray:
         """Mask of the thickness parameters among its own entries of p."""
         return np.zeros(0, bool) if self.follows else self.spline.is_thickness[self.spline.of_shape]

@@ -102,7 +102,7 @@ class TargetResult:
         started: value of the design the optimisation started from, as the optimiser saw it: that of a surrogate.
         reached: value of the best design on the simulation's mesh.
         finer_elements_add: estimated discretisation error of the reached value, to be added: the change by infinitely
-            fine elements.
+            fine elements. Of a smooth extreme, what the true one adds to it.
         corrected: their sum, with which the target is compared; the reached value alone of an optimisation without
             estimates. Of a simulation in plane stress it is the value in plane stress; ``Curve.corrected`` is that in
             3D.

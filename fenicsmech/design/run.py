@@ -23,6 +23,7 @@ from fenicsmech.design.objective import Objective
 from fenicsmech.design.optimisers.problem import Evaluation, Infeasible, Iterate, Optimiser, Reason, Start
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
+from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.target import Target
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import atomic_write, read_json
@@ -102,6 +103,23 @@ def _follow(comm: MPI.Comm, objective: Objective) -> None:
             failure = failure or error
     if failure is not None:
         raise failure
+
+
+@dataclass(frozen=True, eq=False)
+class DesignIterate:
+    """A design on the way of an optimisation.
+
+    Attributes:
+        number: iterations so far.
+        placement: parameters and handle positions, which ``optimise(start=…)`` and ``rest_shape`` take.
+        values: corrected values that targets are compared with, (components,).
+        errors: of the targets, relative, (targets,).
+    """
+
+    number: int
+    placement: HandlePlacement
+    values: np.ndarray
+    errors: np.ndarray
 
 
 _FORMAT = "fenicsmech checkpoint 5"

@@ -226,7 +226,7 @@ class Search:
         try:
             result = self._problem.optimise(optimiser=optimiser, start=start, correction=plain)
             return StartResult(k, rejected, None, False, result)
-        except EquilibriumError as failure:
+        except (EquilibriumError, ShapeError) as failure:
             return StartResult(k, rejected, str(failure), False, None)
 
     def _scattered(self, k: int) -> tuple[np.ndarray | None, int]:

@@ -172,6 +172,8 @@ class Comparison:
         places: the components of each target.
         scales, scale_of: of the targets, (targets,), and of their components, (components,).
         relative: whether a minimised quantity is relative to its drawn value.
+        smoothed: which components are smoothed extremes, (components,).
+        resolution: changes of components within the accuracy of extremes, over their scales, (components,).
 
     Raises:
         DescriptionError: zero is wanted, and no scale is given.
@@ -185,6 +187,8 @@ class Comparison:
         self._equal, self._bounded = relations == "equals", np.isin(relations, ("at most", "at least"))
         self._summed = relations == "least"
         self.relative = any(target.relation == "least" and target.scale is None for target in targets)
+        self.smoothed = np.repeat([target.quantity.smoothed for target in targets], sizes)
+        self.resolution = np.repeat([target.quantity.resolution for target in targets], sizes)
         self._wanted = np.concatenate([target.wanted or (0.0,) for target in targets])
         self.scales = np.array(
             [self._scale(k, None if drawn is None else float(drawn[self.places[k]][0])) for k in range(len(targets))]

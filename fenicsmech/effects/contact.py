@@ -22,7 +22,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 from scipy.sparse import bsr_matrix, csr_matrix, identity, kron
 
-from fenicsmech.compat import add_ghosts, cell_dofs, cell_nodes, owned_values
+from fenicsmech.compat import add_ghosts, cell_dofs, cell_nodes, lagrange_element, owned_values
 from fenicsmech.effects.link_fields import Faces, LinkFields
 from fenicsmech.errors import DescriptionError, direction, in_plane, point, points, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimension
@@ -30,7 +30,6 @@ from fenicsmech.multibody import Linkage, PosePotential
 from fenicsmech.symbolic import SmoothFunction, derive
 
 _FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
-_CELLS = {2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}
 
 _RELATIVE_STIFFNESS = 0.1
 """Default stiffness over that of the outermost layer of elements."""
@@ -274,7 +273,7 @@ class OneSided:
 
     @cached_property
     def _gap(self) -> SmoothFunction:
-        return _smooth_gap(self._obstacle, self._body.model.dim)
+        return smooth_gap(self._obstacle, self._body.model.dim)
 
     def _heights(self) -> np.ndarray:
         """Heights of the cells over their facets, as meshed, (facets,)."""
@@ -301,6 +300,12 @@ class OneSided:
         numbers = np.array([self._obstacle.numbers])
         self.gaps = self._gap.value(self.places, numbers)[:, 0]
         self._normals = self._gap.gradient(self.places, numbers)[:, 0]
+
+    @property
+    def touched(self) -> np.ndarray:
+        """Vertices of this rank's facets with a point inside the obstacle, (k, dim), numbered in the whole mesh."""
+        inside = (self.gaps.reshape(-1, len(self._points)) < 0.0).any(axis=1)
+        return self._boundary.corners[inside]
 
     def _take_rest(self) -> None:
         """Places and weights of the points in the rest shape."""
@@ -359,9 +364,7 @@ class OneSided:
         along the facets' edges from the first corner to each other one."""
         space, sides = field.function_space, self._boundary.sides
         dim, dofs = self._body.model.dim, cell_dofs(space)[self._boundary.cells]
-        element = basix.create_element(
-            basix.ElementFamily.P, _CELLS[dim], self._degree(dofs.shape[1]), basix.LagrangeVariant.gll_warped
-        )
+        element = lagrange_element(dim, dofs.shape[1])
         corners = np.vstack([np.zeros(dim), np.eye(dim)])
         values = np.zeros((1 + order * (dim - 1), len(sides), len(self._points), dofs.shape[1]))
         for own in np.unique(sides, axis=0):
@@ -379,11 +382,6 @@ class OneSided:
             found.append(csr_matrix((table.ravel(), columns, starts), shape=shape, copy=True))
             found[-1].eliminate_zeros()  # in its own arrays
         return found
-
-    def _degree(self, nodes: int) -> int:
-        """The degree of the element with as many nodes."""
-        by_nodes = {2: {3: 1, 6: 2, 10: 3}, 3: {4: 1, 10: 2, 20: 3}}
-        return by_nodes[self._body.model.dim][nodes]
 
 
 class _Points(PosePotential):
@@ -414,7 +412,7 @@ class _Points(PosePotential):
 
     @cached_property
     def _gap(self) -> SmoothFunction:
-        return _smooth_gap(self._obstacle, self._space.dim)
+        return smooth_gap(self._obstacle, self._space.dim)
 
     def _touching(self, poses: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
         """Of the points inside: arguments of g, −g, offsets from the body's centre, and ∂u/∂z."""
@@ -426,7 +424,7 @@ class _Points(PosePotential):
         return (where[inside], numbers), -gap[inside], offsets, self._space.displacement_gradient(pose, offsets)
 
 
-def _smooth_gap(obstacle: Obstacle, dim: int) -> SmoothFunction:
+def smooth_gap(obstacle: Obstacle, dim: int) -> SmoothFunction:
     """g at many points in ``dim`` dimensions, of their coordinates and the obstacle's numbers, with its derivatives."""
     x, numbers = sympy.symbols(f"x:{dim}"), sympy.symbols(f"c:{len(obstacle.numbers)}")
     return derive([obstacle.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)

@@ -23,6 +23,8 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.meshing import on_mid_plane
 
+_TILTED = 0.25  # sine of an angle that facets with their corners on a cylinder stay below
+
 
 @dataclass(frozen=True)
 class Faces:
@@ -76,6 +78,14 @@ class Boundary:
             for facet in np.sort(found, axis=1).tolist():
                 rims.update(combinations(facet, len(facet) - 1))
         return all(count % 2 == 0 or joined.issuperset(rim) for rim, count in rims.items())
+
+    def is_extruded(self, comm: MPI.Comm) -> bool:
+        """True if the facets of all ranks, in space, are parallel to z or across it, up to the tilt on curved sides."""
+        a, b, c = np.moveaxis(self.places, 1, 0)
+        areas = np.cross(b - a, c - a)
+        sizes = np.linalg.norm(areas, axis=1)
+        aslant = np.minimum(np.abs(areas[:, 2]), np.linalg.norm(areas[:, :2], axis=1)) > _TILTED * sizes
+        return not comm.allreduce(bool(aslant.any()), op=MPI.LOR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,12 +174,15 @@ class LinkFields:
         area = self.area_vector(self.body.rest_gradient)
         return self._reference_integral(density * ufl.sqrt(ufl.dot(area, area)), faces, degree)
 
-    def flux(self, vector, faces: Faces, *, degree: int) -> ufl.Form:
+    def flux(self, vector, faces: Faces, *, degree: int, within_plane: bool = False) -> ufl.Form:
         """∫ vector · n da over ``faces`` of the links as deformed, their depth at rest included.
 
-        n points out of the link. By Nanson's formula n da = cof(∇X + ∇u) N dA₀.
+        n points out of the link. By Nanson's formula n da = cof(∇X + ∇u) N dA₀. ``within_plane`` leaves out what
+        moves along z, u = (u_x, u_y, 0).
         """
-        area = self.area_vector(self.body.rest_gradient + ufl.grad(self.u))
+        rest, moved = self.body.rest_gradient, self.body.rest_gradient + ufl.grad(self.u)
+        rows = [rest if within_plane and k == 2 else moved for k in range(self.dim)]
+        area = self.area_vector(ufl.as_matrix([[rows[k][k, m] for m in range(self.dim)] for k in range(self.dim)]))
         return self._reference_integral(ufl.dot(vector, area), faces, degree)
 
     @property

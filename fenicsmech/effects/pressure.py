@@ -1,15 +1,20 @@
 """Pressure on the boundary of a flexible link: it stays normal to the boundary and grows with its area.
 
-    V = (p / n) ∫ P (x − x₀) · n da,     δV = p ∫ δx · n da + a term at the rim,
+    V = (p / dim) ∫ (x − x₀) · n da,     δV = p ∫ δx · n da + a term at the rim,
 
-p times the volume that the boundary encloses with x₀: P = I and n = dim for a point x₀, in space also P = I − e_z ⊗ e_z
-and n = 2 for an axis along z. Closed boundaries have no rim, and x₀ plays no part. The term at the rim of an open one
-vanishes
+p times the volume that the boundary encloses with a point x₀. Closed boundaries have no rim, and x₀ plays no part. The
+term at the rim of an open one vanishes
 
 - where the rim is held,
 - in the plane, where its ends move along lines through x₀, as on an axis of symmetry,
-- in space, where it moves within planes through x₀ that it lies in, as on a plane of symmetry; with an axis x₀, within
-  planes z = const. that it lies in: motions along z would feel the load on plugs that close the hole.
+- in space, where it moves within planes through x₀ that it lies in, as on a plane of symmetry.
+
+The sides of extruded links, as the bore of a hole, end at rims that move along z. Their x₀ is an axis along z, and
+
+    V = (p / 2) ∫∫ ((x − x₀) × ∂x/∂s) · e_z ds dZ,     δV = p ∫∫ (δx × ∂x/∂s) · e_z ds dZ + the term of the plane,
+
+p times the areas that the sections enclose, over the depth Z at rest: pressure acts within the plane, on no face across
+z. What it leaves out, p times the strain along z and the slope of sides that tilt, is of second order in the load.
 
 With other rims the load has no potential: its work depends on the path.
 """
@@ -38,11 +43,11 @@ class Pressure(Effect):
         where: predicate of points on the drawn boundary, (n, dim) → (n,) bool; a facet belongs to the part if it holds
             at all its corners. None: the whole boundary.
         about: x₀; required for an open part, whose rim must be held or move as above. In space two coordinates are an
-            axis along z, which suits holes through extruded links, and their sides.
+            axis along z, for holes through extruded links, and their sides.
 
     Raises:
         DescriptionError: a number is invalid, or the link is not flexible. Later, when it is meshed: the part is
-            open without a point to go ``about``, or empty.
+            open without a point to go ``about``, or empty, or aslant to the axis.
     """
 
     link: FlexibleLink
@@ -88,8 +93,15 @@ class Pressure(Effect):
         dim, order = fields.dim, fields.order
         centre = (0.0,) * dim if self.about is None else self.about[:dim]
         along = len(centre)
+        if along < dim and not fields.boundaries[faces].is_extruded(fields.mesh.comm):
+            raise DescriptionError(
+                f"pressure on {self.link.name!r}",
+                f"about={centre} is an axis along z, and some of the facets it acts on are aslant to it",
+                "Give about=… with three coordinates, or a predicate of the sides alone",
+            )
         pressure = fem.Constant(fields.mesh, self.pressure / along)
         start = fem.Constant(fields.mesh, np.array(centre))
         arm = [fields.position[k] - start[k] for k in range(along)] + [0.0] * (dim - along)
         # x has the degree of u, n da its (dim − 1)th power one degree lower
-        return fields.flux(pressure * ufl.as_vector(arm), faces, degree=order + (dim - 1) * (order - 1))
+        degree = order + (dim - 1) * (order - 1)
+        return fields.flux(pressure * ufl.as_vector(arm), faces, degree=degree, within_plane=along < dim)

@@ -2,21 +2,23 @@
 
     E = ∫ W(F F_p⁻¹) det F_p dV,     F_p = λ I or I + (λ − 1) e ⊗ e
 
-replaces the link's strain energy. Models swelling, thermal expansion, shrinkage of prints, embedded tendons.
+replaces the link's strain energy. Models swelling, shrinkage of prints, embedded tendons.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenicsmech.elasticity import PLANE_STRAIN, Stretch
-from fenicsmech.errors import DescriptionError, direction, expect, in_plane, positive, set_fields
+from fenicsmech.elasticity import Stretch
+from fenicsmech.errors import direction, expect, in_plane, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, in_dimension
 
 
 @dataclass(frozen=True)
 class Prestrain(Effect):
     """A flexible link whose strain-free state is stretched; its interfaces stay as they are.
+
+    In plane strain the depth may not follow a stretch in all directions, which stresses the link.
 
     Attributes:
         link: the link.
@@ -45,11 +47,5 @@ class Prestrain(Effect):
         where = "in all directions" if self.along is None else f"along {self.along}"
         return f"prestrain of {self.link.name}, {self.stretch:g} times as long {where} without strain"
 
-    def growth(self, model):
-        if self.along is None and model is PLANE_STRAIN:
-            raise DescriptionError(
-                f"prestrain of {self.link.name!r}",
-                "in all directions it would also strain the depth, which plane strain forbids",
-                "Give along=…, or simulate in plane stress or in 3D",
-            )
+    def growth(self, model, links):
         return {self.link: Stretch(self.stretch, self.along and in_dimension(self.along, model.dim))}

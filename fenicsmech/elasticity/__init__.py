@@ -3,6 +3,7 @@
 - ``models``: assumptions about the third dimension (3D, whole or half; plane strain, plane stress) and about links
   of nearly incompressible material (displacement or u–p formulation)
 - ``fields``: shape, displacement, pressure, parameters of laws, growth
+- ``specimens``: nominal stresses of specimens of material tests
 - ``body``: energy, residual, stiffness and stress of all links, and the stress predicted by a Newton step
 """
 
@@ -21,3 +22,4 @@ from fenicsmech.elasticity.models import (
     Quadrature,
     cauchy_stress,
 )
+from fenicsmech.elasticity.specimens import SPECIMENS, Specimen, check_kind, specimen_stress

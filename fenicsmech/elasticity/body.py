@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
+import basix
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -40,9 +41,12 @@ from fenicsmech.compat import (
     create_block_matrix,
     evaluate_expression,
     owned_values,
+    quadrature_space,
 )
 from fenicsmech.elasticity.fields import BodyFields
 from fenicsmech.elasticity.models import PlaneStress, cauchy_stress
+
+_CELLS = {2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}
 
 
 class ElasticBody(BodyFields):
@@ -92,7 +96,7 @@ class ElasticBody(BodyFields):
     def contraction_energy(self, a, v, p, q, pressures: Sequence[float], *, degree: int) -> ufl.Form:
         """Energy of links in plane stress that contract by a instead of h = F₃₃ − 1 and curl across their depth by v.
 
-        ½ ∫ E ((a − p)² − 2 q h) / g² + μ b²/12 |s|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) + 2 P a det F dV
+        ½ ∫ E₃ ((a − p)² − 2 q h) / g² + μ b²/12 |s|² + b⁴/720 E/(1 − ν²) ((1 − ν) G : G + ν (tr G)²) + 2 P a det F dV
 
         with s = F_p⁻ᵀ (∇a − Fᵀv / g), G = F_p⁻ᵀ sym(Fᵀ∇v) F_p⁻¹ and p the projection of h, whose derivatives are those
         of the term in q, that of a − p. F_p is the growth, g that of the depth. P is the load factor times the
@@ -111,7 +115,7 @@ class ElasticBody(BodyFields):
             G = ufl.dot(inverse.T, ufl.dot(G, inverse))
         for term in self.terms:
             E, nu, h = term.law.E, term.law.nu, grown * (1 + self.model.contraction(term.law, self._elastic(H))) - 1
-            contraction = E * ((a - p) ** 2 - 2 * q * h) / grown**2
+            contraction = term.law.E_across_plane * ((a - p) ** 2 - 2 * q * h) / grown**2
             curling = b**2 / 12 * E / (2 * (1 + nu)) * ufl.inner(shear, shear)
             membrane = b**4 / 720 * E / (1 - nu**2) * ((1 - nu) * ufl.inner(G, G) + nu * ufl.tr(G) ** 2)
             density = 0.5 * (contraction + curling + membrane) * self._volume + squeezing * self._rest_volume
@@ -126,6 +130,29 @@ class ElasticBody(BodyFields):
             C = ufl.diff(ufl.diff(density, H), H)
             terms.append(A[i, j] * C[i, j, k, m] * B[k, m] * dx(metadata={"quadrature_degree": degree}))
         return _sum(terms)
+
+    @property
+    def stresses_ufl(self) -> list:
+        """σ, 3 × 3, symbolic, per law."""
+        return self._stresses(self.gradient(self.u))
+
+    def _stresses(self, H) -> list:
+        """σ at the gradient H on the rest shape, 3 × 3, symbolic, per law."""
+        H, found = self._elastic(H), []
+        for term in self.terms:
+            p = self.pressure.p if self.pressure is not None and term.mixed else None
+            found.append(cauchy_stress(self.model, term.law, H, p))
+        return found
+
+    @property
+    def elastic_ufl(self):
+        """The elastic part of F on the mesh, (dim, dim), symbolic."""
+        return self._elastic_at(self.gradient(self.u))
+
+    def _elastic_at(self, H):
+        """The elastic part of F at the gradient H on the rest shape, (dim, dim), symbolic."""
+        H, axes = self._elastic(H), range(self.model.dim)
+        return ufl.as_matrix([[H[i, j] + float(i == j) for j in axes] for i in axes])
 
     def _elastic(self, H):
         """The elastic part of H."""
@@ -259,20 +286,87 @@ class ElasticBody(BodyFields):
         volume = self.mesh.comm.allreduce(fem.assemble_scalar(compile_form(form)))
         return float(np.sqrt(self.pressure.count / volume))
 
-    def von_mises(self) -> np.ndarray:
-        """Von Mises stress √(3/2 dev σ : dev σ) at the midpoint of each local cell, (cells,)."""
-        values = np.zeros(sum(len(term.cells) for term in self.terms))
-        for expression, term in zip(self._stresses, self.terms, strict=True):
-            values[term.cells] = evaluate_expression(expression, self.mesh, term.cells)[:, 0]
-        return values
+    def stress_samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """σ, (cells, q, 3, 3), and F of the mesh, (cells, q, dim, dim), at ``sample_points`` of each local cell.
+
+        Zero in cells that cannot deform. Both are without the ``gradient_errors``.
+        """
+        dim, q = self.model.dim, len(self.sample_points)
+        values = np.zeros((len(self._link), q * (9 + dim**2)))
+        for expression, term in zip(self._samples, self.terms, strict=True):
+            values[term.cells] = evaluate_expression(expression, self.mesh, term.cells)
+        values = values.reshape(-1, q, 9 + dim**2)
+        return values[..., :9].reshape(-1, q, 3, 3), values[..., 9:].reshape(-1, q, dim, dim)
+
+    def elastic_samples(self) -> np.ndarray:
+        """The elastic part of F at ``sample_points`` of each local cell, (cells, q, dim, dim); else as there."""
+        dim, q = self.model.dim, len(self.sample_points)
+        values = np.zeros((len(self._link), q * dim**2))
+        for term in self.terms:
+            values[term.cells] = evaluate_expression(self._elastic_samples, self.mesh, term.cells)
+        return values.reshape(-1, q, dim, dim)
 
     @cached_property
-    def _stresses(self) -> list[fem.Expression]:
-        """The compiled von Mises stress at cell midpoints, per law."""
-        midpoint, H = np.full((1, self.model.dim), 1.0 / (self.model.dim + 1)), self._elastic(self.gradient(self.u))
-        # without p, which does not change the deviator
-        stresses = [ufl.dev(cauchy_stress(self.model, term.law, H)) for term in self.terms]
-        return [compile_expression(ufl.sqrt(1.5 * ufl.inner(s, s)), midpoint, self.mesh.comm) for s in stresses]
+    def _elastic_samples(self) -> fem.Expression:
+        """The compiled components of the elastic part of F at the points of samples."""
+        F = self._elastic_at(self._sampled_gradient)
+        parts = [F[i, j] for i in range(self.model.dim) for j in range(self.model.dim)]
+        return compile_expression(ufl.as_vector(parts), self.sample_points, self.mesh.comm)
+
+    def spatial_samples(self) -> np.ndarray:
+        """The elastic part of F as the model completes it, (cells, q, 3, 3); else as ``elastic_samples``."""
+        values = np.zeros((len(self._link), 9 * len(self.sample_points)))
+        for expression, term in zip(self._spatial_samples, self.terms, strict=True):
+            values[term.cells] = evaluate_expression(expression, self.mesh, term.cells)
+        return values.reshape(len(self._link), -1, 3, 3)
+
+    @cached_property
+    def _spatial_samples(self) -> list[fem.Expression]:
+        """The compiled components of that, per law."""
+        found, H = [], self._elastic(self.gradient(self.u))
+        for term in self.terms:
+            F = self.model.strain(term.law, H).F
+            parts = ufl.as_vector([F[i, j] for i in range(3) for j in range(3)])
+            found.append(compile_expression(parts, self.sample_points, self.mesh.comm))
+        return found
+
+    @property
+    def sample_points(self) -> np.ndarray:
+        """Points of the reference cell where stresses are most accurate: of Gauss quadrature, (q, dim)."""
+        return self.sample_rule[0]
+
+    @property
+    def sample_degree(self) -> int:
+        """Degree of the quadrature whose points those of samples are."""
+        return max(2 * self.order - 2, 1)
+
+    @cached_property
+    def sample_rule(self) -> tuple[np.ndarray, np.ndarray]:
+        """Its points, (q, dim), and weights, (q,)."""
+        points, weights = basix.make_quadrature(_CELLS[self.model.dim], self.sample_degree)
+        return points, weights
+
+    @cached_property
+    def gradient_errors(self) -> fem.Function:
+        """Errors of H at ``sample_points``, row by row, that samples leave out; none unless they are set."""
+        return fem.Function(quadrature_space(self.mesh, self.sample_degree, self.model.dim**2))
+
+    @property
+    def _sampled_gradient(self):
+        """H without its errors, symbolic."""
+        dim, errors = self.model.dim, self.gradient_errors
+        return self.gradient(self.u) - ufl.as_matrix([[errors[dim * i + j] for j in range(dim)] for i in range(dim)])
+
+    @cached_property
+    def _samples(self) -> list[fem.Expression]:
+        """The compiled components of σ and F at the points of samples, per law."""
+        H, found = self._sampled_gradient, []
+        F = ufl.Identity(self.model.dim) + H
+        for stress in self._stresses(H):
+            parts = [stress[i, j] for i in range(3) for j in range(3)]
+            parts += [F[i, j] for i in range(self.model.dim) for j in range(self.model.dim)]
+            found.append(compile_expression(ufl.as_vector(parts), self.sample_points, self.mesh.comm))
+        return found
 
 
 class PredictedStress:

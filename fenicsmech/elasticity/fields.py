@@ -7,20 +7,23 @@ displacement u from the rest shape:
 
 Forms hold s alone: c does not change, so ∂/∂d = ∂/∂s.
 
-Links whose strain-free state is not the one drawn have grown by F_p, and only F_e of F = F_e F_p strains the material:
+Links whose strain-free state is not the one drawn have grown by F_p, and only F_e of F = F_e F_p strains the material.
+Effects of each kind k stretch a link by λ, along e or in all directions:
 
-    F_p = I + σ (λ − 1) N,     N = e ⊗ e or I,
-    H_e = F_e − I = H + Γ + H Γ,     Γ = F_p⁻¹ − I = −σ (λ − 1) / (1 + σ (λ − 1)) N,
+    F_p = Π (I + g N),     g = σ (λ − 1),     N = e ⊗ e or I,
+    H_e = F_e − I = H + Γ + H Γ,     I + Γ = F_p⁻¹ = Π (I − g / (1 + g) N),
 
-and W counts per strain-free volume, det F_p times the drawn one: (1 + σ (λ − 1)) to the power of 1 or 3. σ is the load
-factor of effects.
+and W counts per strain-free volume, det F_p times the drawn one: each factor is 1 + g or (1 + g)³. σ is the load factor
+of effects. The factors commute, as at most one of a link has a direction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -76,44 +79,94 @@ class Stretch:
     along: tuple[float, ...] | None
 
 
-class Growth:
-    """F_p, one value per cell, from the ``stretches`` of links; only cells that are ``free`` to deform grow."""
+class _Factor:
+    """One factor I + g N of F_p, from the ``stretches`` of links."""
 
-    def __init__(self, fields: BodyFields, stretches: Sequence[Stretch | None], free: np.ndarray) -> None:
-        every, dim = [stretch or Stretch(1.0, None) for stretch in stretches], fields.model.dim
-        self.load_factor = ufl.variable(fields.load_factor)
-        self._excess = fields.cellwise([stretch.ratio - 1.0 for stretch in every])
-        self._excess.x.array[np.flatnonzero(~free)] = 0.0
-        # planar links are free to grow in depth
-        self._power = fields.cellwise([3.0 if stretch.along is None else 1.0 for stretch in every])
-        tensors = np.array([np.eye(dim) if s.along is None else np.outer(s.along, s.along) for s in every])
-        parts = {(i, j): fields.cellwise(tensors[:, i, j]) for i in range(dim) for j in range(i, dim)}
-        self._tensor = ufl.as_matrix([[parts[min(i, j), max(i, j)] for j in range(dim)] for i in range(dim)])
-
-    def elastic(self, H):
-        """H_e in UFL."""
-        return H + self._inverse_excess + ufl.dot(H, self._inverse_excess)
+    def __init__(self, fields: BodyFields, stretches: Sequence[Stretch | None], load_factor: Any) -> None:
+        dim, directed = fields.model.dim, {stretch.along is not None for stretch in stretches if stretch is not None}
+        every = [stretch or Stretch(1.0, None) for stretch in stretches]
+        self.excess = fields.cellwise([stretch.ratio - 1.0 for stretch in every])
+        self._grown, self._tensor = load_factor * self.excess, ufl.Identity(dim)
+        # of the depth: planar links that grow in all directions do so across it, too
+        self.across = self._grown if False in directed else ufl.as_ufl(0)
+        if True in directed:
+            tensors = np.array([np.eye(dim) if s.along is None else np.outer(s.along, s.along) for s in every])
+            parts = {(i, j): fields.cellwise(tensors[:, i, j]) for i in range(dim) for j in range(i, dim)}
+            self._tensor = ufl.as_matrix([[parts[min(i, j), max(i, j)] for j in range(dim)] for i in range(dim)])
+            self.across = self.across * fields.cellwise([float(stretch.along is None) for stretch in every])
 
     @property
-    def inverse(self):
-        """F_p⁻¹ in UFL."""
-        return ufl.Identity(self._tensor.ufl_shape[0]) + self._inverse_excess
-
-    @property
-    def _inverse_excess(self):
-        """F_p⁻¹ − I in UFL."""
-        grown = self.load_factor * self._excess
-        return -grown / (1 + grown) * self._tensor
+    def inverse_excess(self):
+        """Its inverse less I."""
+        return -self._grown / (1 + self._grown) * self._tensor
 
     @property
     def volume(self):
-        """det F_p in UFL, the growth of depth included."""
-        return (1 + self.load_factor * self._excess) ** self._power
+        """Its determinant, the growth of depth included."""
+        return (1 + self._grown) * (1 + self.across) ** 2
+
+
+class Growth:
+    """F_p, one value per cell, in UFL; only cells that are free to deform grow.
+
+    Args:
+        fields: of the body.
+        stretches: of each link by kind of effect, None where it has none.
+        link: index of the link of each local cell, −1 where it cannot deform, (cells,).
+
+    Attributes:
+        load_factor: σ, with respect to which forms can be differentiated.
+        excess: λ − 1 by kind of effect.
+    """
+
+    def __init__(self, fields: BodyFields, stretches: Mapping[str, Sequence[Stretch | None]], link: np.ndarray) -> None:
+        self._model, self._link = fields.model, link
+        self.load_factor = ufl.variable(fields.load_factor)
+        self._factors = [_Factor(fields, own, self.load_factor) for own in stretches.values()]
+        self.excess = {kind: factor.excess for kind, factor in zip(stretches, self._factors, strict=True)}
+        for excess in self.excess.values():
+            excess.x.array[np.flatnonzero(link < 0)] = 0.0
+
+    def stretch(self, kind: str, link: int, excess: float) -> None:
+        """Gives a link λ − 1 = ``excess`` by a kind of effect. Local."""
+        self.excess[kind].x.array[np.flatnonzero(self._link == link)] = excess
+
+    def elastic(self, H):
+        """H_e, in the form that ``ElasticModel.strain`` takes."""
+        return self._model.grown(_composed([H, self._inverse_excess]), -self._across / (1 + self._across))
+
+    @property
+    def inverse(self):
+        """F_p⁻¹ on the mesh."""
+        return ufl.Identity(self._model.dim) + self._inverse_excess
+
+    @property
+    def _inverse_excess(self):
+        """F_p⁻¹ − I on the mesh."""
+        return _composed([factor.inverse_excess for factor in self._factors])
+
+    @property
+    def volume(self):
+        """det F_p, the growth of depth included."""
+        return prod(factor.volume for factor in self._factors)
 
     @property
     def depth(self):
-        """Strain-free depth over the drawn one, in the plane, in UFL."""
-        return (1 + self.load_factor * self._excess) ** ((self._power - 1) / 2)
+        """Strain-free depth over the drawn one, in the plane."""
+        return 1 + self._across
+
+    @property
+    def _across(self):
+        """Strain-free depth over the drawn one, less 1, in the plane."""
+        return _composed([factor.across for factor in self._factors])
+
+
+def _composed(excesses: Sequence[Any]) -> Any:
+    """Π (I + A) − I of tensors or numbers A, without loss of digits where they are small."""
+    total, *others = excesses
+    for other in others:
+        total = total + other + ufl.dot(total, other)
+    return total
 
 
 @dataclass(frozen=True)
@@ -139,7 +192,7 @@ class BodyFields:
         order: degree of the displacement field.
         quadrature: explicit degree; never UFL's estimate.
         effects: energies in addition to the elastic one, as functions of this body.
-        stretches: of the strain-free state of each link, None where it is as drawn.
+        stretches: of the strain-free state of each link by kind of effect, None where it does not change it.
         bulge: c, by which curved cells differ from straight ones; None if all are straight.
         mixed: whether each link is in the u–p formulation.
 
@@ -150,8 +203,8 @@ class BodyFields:
         pressure: of the links in the u–p formulation, P_(order − 1); None if no link is.
         parameters: of the links' laws by name, each with one value per cell; changing them needs no compiling.
         depth: one value per cell.
-        numbers: what energies depend on of the numbers of links: ``parameters``, in the plane ``depth``, and what
-            effects add.
+        numbers: what energies depend on of the numbers of links: ``parameters``, in the plane ``depth``, the
+            ``excess`` of growth, and what effects add.
         load_factor: of the effects.
         growth: of the strain-free state; None if all links are as drawn.
         dx: measure of all cells, interfaces included.
@@ -170,7 +223,7 @@ class BodyFields:
         order: int,
         quadrature: Quadrature,
         effects: Sequence[Callable[[Any], ufl.Form | None]] = (),
-        stretches: Sequence[Stretch | None] = (),
+        stretches: Mapping[str, Sequence[Stretch | None]] = MappingProxyType({}),
         bulge: fem.Function | None = None,
         mixed: Sequence[bool] = (),
     ) -> None:
@@ -191,7 +244,8 @@ class BodyFields:
         self.pressure = None
         if any(mixed):
             self.pressure = PressureField(mesh, order - 1, np.flatnonzero(free & np.array(mixed)[link]))
-        self.growth = Growth(self, stretches, free) if any(stretches) else None
+        self.growth = Growth(self, stretches, np.where(free, link, -1)) if stretches else None
+        self.numbers |= {} if self.growth is None else self.growth.excess
 
         kinds = [(str(type(m.law)), *m.law.parameters, own) for m, own in zip(materials, mixed, strict=True)]
         known = sorted(set(kinds), key=str)

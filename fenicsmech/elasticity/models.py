@@ -5,8 +5,15 @@ the plane, with j₂ = tr H + det H = J₂ − 1 and the contraction h = F₃₃
 
     J − 1 = j₂ + J₂ h,      tr FᵀF − 3 − 2 (J − 1) = H : H − 2 det H − 2 j₂ h + h².
 
-Plane strain has h = 0. Plane stress has S₃₃ = 0, which is ∂W/∂h = 0: in closed form where the law has one, else by
-Newton's method at every point.
+Plane strain has F₃₃ = 1, h = 0; where links have grown by the factor 1 + g across their depth, the elastic part of F₃₃
+is 1/(1 + g) and h = −g/(1 + g). Plane stress has S₃₃ = 0, which is W_h = ∂W/∂h = 0: in closed form where the law has
+one, else by Newton's method at every point, in ln(1 + h), from which material is never squeezed to nothing. With h₀
+found,
+
+    h = h₀ − W_h(H, h₀) / W_hh,
+
+where derivatives of h₀ and W_hh are not taken. The derivative of h by H, −W_hH / W_hh, is right nevertheless, and since
+W is stationary in h, derivatives of the energy are right up to the third. So forms hold no derivatives of iterations.
 
 Displacements alone lock as ν goes to 0.5. In links in the u–p (mixed) formulation the energy W(F) of the law is
 replaced by its Π(F, p), see ``SplitLaw``, a minimum in u and a maximum in the pressure p. With p continuous and one
@@ -19,13 +26,19 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from ufl import Identity, as_matrix, det, diff, dot, inner, tr, variable
+from ufl import Identity, as_matrix, det, diff, dot, exp, inner, max_value, min_value, sinh, tr, variable
+from ufl.constantvalue import Zero
 from ufl.core.expr import Expr
 
-from fenicsmech.errors import DescriptionError, finite, set_fields, whole
-from fenicsmech.laws import Law, NeoHookean, Strain, spatial_strain
+from fenicsmech.errors import DescriptionError, finite, point_text, set_fields, whole
+from fenicsmech.laws import Law, NeoHookean, PlanarStrain, Strain, spatial_strain, undifferentiated
 from fenicsmech.mechanism import Material
+
+_STEPS = 6
+"""Of Newton's method across the plane: five leave rounding where rubber is stretched to 0.4 or 6 times its length, and
+one is in hand for other laws (tests/elasticity/test_hand_curves.py)."""
 
 LOCKING = 0.49
 """ν above which quadratic displacements alone are too stiff (measured, tests/elasticity/test_locking.py)."""
@@ -51,13 +64,33 @@ class ElasticModel(ABC):
         """Whether the mesh is one half of the links, the other its mirror image at the plane z = 0."""
         return self.mechanism_dim < self.dim
 
+    def check(self, materials: Sequence[Material]) -> None:
+        """Checks that links in the plane stay in it: that an axis of each law is normal to the plane.
+
+        Raises:
+            DescriptionError: the law of a material has no such axis.
+        """
+        for material in materials:
+            if self.mechanism_dim == 2 and max(abs(axis[2]) for axis in material.law.axes) < 1.0 - 1e-9:
+                given = ", ".join(point_text(axis) for axis in material.law.axes)
+                raise DescriptionError(
+                    f"material {material.name!r}",
+                    f"none of the axes of its law, {given}, is normal to the plane, out of which its links would bend",
+                    "Turn the directions of the law, as along=(…), into the plane, or use space='3d'",
+                )
+
     @abstractmethod
     def multiplier(self, depth: Expr | float) -> Expr | float:
         """Factor from integrals over the mesh of a link to those over the link, from its ``depth``."""
 
     @abstractmethod
     def strain(self, law: Law, H: Expr) -> Strain:
-        """The strain of a material of ``law`` at the gradient H of the mesh, (dim, dim)."""
+        """The strain of a material of ``law`` at the gradient H of the mesh, (dim, dim), or as ``grown`` gives it."""
+
+    def grown(self, H: Expr, h: Expr) -> Expr:
+        """The elastic gradient of links that have grown, as ``strain`` takes it: from that of the mesh, H, and, where
+        the model holds the depth, from that across it, h."""
+        return H
 
 
 class Solid(ElasticModel):
@@ -96,7 +129,12 @@ class PlaneStrain(ElasticModel):
         return depth
 
     def strain(self, law, H):
-        return Strain(_embed(H, 0.0), tr(H) + det(H), inner(H, H) - 2 * det(H))
+        if H.ufl_shape == (3, 3):
+            return spatial_strain(H)
+        return PlanarStrain(_embed(H, 0.0), tr(H) + det(H), inner(H, H) - 2 * det(H), H, 0.0)
+
+    def grown(self, H, h):
+        return H if isinstance(h, Zero) else _embed(H, h)
 
 
 class PlaneStress(PlaneStrain):
@@ -105,7 +143,10 @@ class PlaneStress(PlaneStrain):
     name, confined = "plane-stress", False
 
     def strain(self, law, H):
-        return _contracted(H, self.contraction(law, H))
+        return contracted(H, self.contraction(law, H))
+
+    def grown(self, H, h):
+        return H
 
     def contraction(self, law: Law, H: Expr) -> Expr:
         """h = F₃₃ − 1 such that S₃₃ = 0."""
@@ -114,32 +155,39 @@ class PlaneStress(PlaneStrain):
 
     @staticmethod
     def _newton(law: Law, H: Expr) -> Expr:
-        """h with ∂W/∂h = 0, by Newton's method from the neo-Hookean one of the same E and ν, exact at small strain.
+        """h with ∂W/∂h = 0, by Newton's method from the neo-Hookean one of the same E and ν, exact at small strain."""
+        held = law.with_parameters({name: undifferentiated(value) for name, value in law.parameters.items()})
+        H0 = undifferentiated(H)
+        h: Any = NeoHookean(1.0, 0.0).with_parameters({"E": held.E, "nu": held.nu}).contraction(H0)
+        for _ in range(_STEPS):
+            slope, curvature = _across(held, H0, h)
+            # of ln(1 + h), downhill where the energy is not convex
+            step = -slope / abs((1 + h) * curvature + slope)
+            step = max_value(-1.0, min_value(1.0, step))
+            h = undifferentiated(h + 2 * (1 + h) * sinh(step / 2) * exp(step / 2))
+        return h - _across(law, H, h)[0] / _across(held, H0, h)[1]
 
-        The error of the energy is the square of that of h, and each step squares this in turn: three leave rounding
-        up to stretches of 1.5, and 1e-8 of the stress at 2 (tests/elasticity/test_new_law.py). h is an expression:
-        stiffnesses are those of these energies, and take long to compile.
-        """
-        h = NeoHookean(1.0, 0.0).with_parameters({"E": law.E, "nu": law.nu}).contraction(H)
-        for _ in range(3):
-            h = variable(h)
-            slope = diff(law.energy(_contracted(H, h)), h)
-            h = h - slope / diff(slope, h)
-        return h
+
+def _across(law: Law, H: Expr, h: Expr) -> tuple[Expr, Expr]:
+    """∂W/∂h and ∂²W/∂h² at the gradient H in the plane."""
+    h = variable(h)
+    slope = diff(law.energy(contracted(H, h)), h)
+    return slope, diff(slope, h)
 
 
-def cauchy_stress(model: ElasticModel, law: Law, H: Expr) -> Expr:
-    """σ = J⁻¹ (∂W/∂F) Fᵀ, 3 × 3, with F = I + H completed by the model's assumption."""
+def cauchy_stress(model: ElasticModel, law: Law, H: Expr, p: Expr | None = None) -> Expr:
+    """σ = J⁻¹ (∂W/∂F) Fᵀ, 3 × 3, with F = I + H completed by the model's assumption; from Π(F, p) where p is given."""
     H = variable(model.strain(law, H).H)
     strain = spatial_strain(H)
-    return dot(diff(law.energy(strain), H), (Identity(3) + H).T) / strain.J
+    energy = law.energy(strain) if p is None else law.mixed_energy(strain, p)
+    return dot(diff(energy, H), (Identity(3) + H).T) / strain.J
 
 
-def _contracted(H: Expr, h: Expr) -> Strain:
+def contracted(H: Expr, h: Expr) -> Strain:
     """The strain of the gradient H in the plane with F₃₃ = 1 + h."""
     j2 = tr(H) + det(H)
     # a negative J₂ makes J negative
-    return Strain(_embed(H, h), j2 + (1 + j2) * h, inner(H, H) - 2 * det(H) - 2 * j2 * h + h**2)
+    return PlanarStrain(_embed(H, h), j2 + (1 + j2) * h, inner(H, H) - 2 * det(H) - 2 * j2 * h + h**2, H, h)
 
 
 def _embed(H: Expr, h: Expr | float) -> Expr:

@@ -4,6 +4,7 @@
 - ``control``: the prescribed force, displacement, motors or arc length
 - ``unknowns``: blocks, numbers and scales of the unknowns, and the change of state they stand for
 - ``border``: loads, potentials of poses and joints
+- ``turning``: steps that turn flexible links instead of straining them, and close joints
 - ``kkt``: the distributed KKT matrix
 - ``system``: energy, residual and KKT matrix at a state
 - ``linearisation``: its factor LDLᵀ with inertia; rates, stability and adjoints at an equilibrium
@@ -20,6 +21,7 @@ from fenicsmech.equilibrium.control import (
     ArcMetric,
     Control,
     DisplacementControl,
+    FollowedControl,
     LoadControl,
     LoadFactorControl,
     MotorControl,
@@ -52,5 +54,6 @@ from fenicsmech.equilibrium.state import (
     motor_torques,
 )
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
+from fenicsmech.equilibrium.turning import TurningLink
 from fenicsmech.equilibrium.two_level import BySize, TwoLevel, TwoLevelSolver
 from fenicsmech.equilibrium.unknowns import Border

@@ -19,7 +19,7 @@ from fenicsmech.equilibrium.control import Control, DisplacementControl, LoadCon
 from fenicsmech.equilibrium.state import State
 from fenicsmech.equilibrium.unknowns import Numbering
 from fenicsmech.mechanism import Link
-from fenicsmech.multibody import BodyPoint, IdleSpin, JointSystem, LinkPoint, PosePotential
+from fenicsmech.multibody import BodyPoint, JointSystem, LinkPoint, PosePotential, Spin
 
 REGULARISATION = 1e-8
 """ε = 1/ρ of the multipliers, the proximal term of the augmented Lagrangian: keeps redundant constraints regular. In
@@ -134,12 +134,7 @@ class BorderTerms:
     # -- Hessian: entries of K̂ as (global rows, global columns, values) ------------------------------------------
 
     def entries(
-        self,
-        state: State,
-        control: Control,
-        moments: Mapping[int, np.ndarray],
-        scale: np.ndarray,
-        idle: Iterable[IdleSpin],
+        self, state: State, control: Control, moments: Mapping[int, np.ndarray], scale: np.ndarray, idle: Iterable[Spin]
     ) -> Entries:
         """All entries at ``state``.
 
@@ -164,10 +159,8 @@ class BorderTerms:
             for one, columns in places:
                 for other, other_columns in places:
                     yield z + columns, z + other_columns, curvature[one, other]
-        for spin in idle:
-            body, gauge = spin.gauge(joints, state.poses)
+        for body, gauge in self.gauges(idle, state, scale):
             columns = joints.columns[body]
-            gauge /= units.poses[columns]
             yield z + columns, z + columns, np.outer(gauge, gauge)
         for poses, other_poses, block in joints.hessian_blocks(state.poses, state.motors, state.multipliers):
             yield z + poses, z + other_poses, -block
@@ -184,7 +177,14 @@ class BorderTerms:
         else:  # f is given: its equation is f = f
             yield load, load, -1.0 / units.load[:, None] ** 2
 
-    def pattern(self, idle: Sequence[IdleSpin]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def gauges(self, spins: Iterable[Spin], state: State, scale: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+        """e of each spin, in the units ``scale`` of the border of size one: a body, and its rate (pose_size,)."""
+        units = self._numbering.unknowns.restrict_border(scale).poses
+        for spin in spins:
+            body, gauge = spin.gauge(self._joints, state.poses)
+            yield body, gauge / units[self._joints.columns[body]]
+
+    def pattern(self, idle: Sequence[Spin]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Pattern of ``entries``, as (global rows, global columns). Local."""
         joints, dim = self._joints, self._joints.space.dim
         motors, constant = np.zeros(len(joints.connections)), np.zeros(len(self._constant))

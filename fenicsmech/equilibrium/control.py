@@ -50,13 +50,19 @@ class Stability:
     under_load: int
     under_displacement: int
 
+    def under(self, control: Control) -> int:
+        """The number while what ``control`` prescribes is held; along a path, the displacement."""
+        held = control.constrained or control.along_path
+        return self.under_displacement if held else self.under_load
+
 
 @dataclass(frozen=True, eq=False)
 class Control(ABC):
     """A prescribed value.
 
-    The controls whose value a path can be followed by, ``LoadControl`` and ``MotorControl``, also have ``opposite``,
-    the control that prescribes their conjugate, ``change``, ``conjugate`` and ``moves``.
+    Those whose value a path can be followed by (``FollowedControl``) have ``opposite``, the control that prescribes
+    their conjugate, ``displaces``, whether the value is a motion, ``change`` and ``moves``; ``LoadControl`` and
+    ``MotorControl`` also have ``conjugate``.
 
     Attributes:
         prescribed: the value.
@@ -249,6 +255,23 @@ class LoadFactorControl(Control):
     def tangent(self, step):
         return replace(step, load_factor=1.0)
 
+    # -- of a path that is followed by its load factor ----------------------------------------------------------------
+
+    displaces = False
+    opposite = None
+
+    def change(self, step: Step) -> float:
+        """The change of the value in a change of state."""
+        return step.load_factor
+
+    def moves(self, system, tangent: Step) -> bool:
+        """Whether constant loads move any node or body."""
+        return system.size(tangent) > 0.0
+
+
+FollowedControl = LoadControl | MotorControl | LoadFactorControl
+"""A control whose value a path can be followed by."""
+
 
 @dataclass(frozen=True)
 class ArcMetric:
@@ -260,7 +283,7 @@ class ArcMetric:
     """
 
     system: Any
-    followed: LoadControl | MotorControl
+    followed: FollowedControl
     motion: float
     value: float
     conjugate: float
@@ -295,7 +318,7 @@ class ArcLengthControl(Control):
     metric: ArcMetric
     origin: State
     normal: Step
-    local: LoadControl | DisplacementControl | MotorControl
+    local: FollowedControl | DisplacementControl
     along_path = True
 
     @property

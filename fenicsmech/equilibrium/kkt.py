@@ -46,7 +46,7 @@ class KktMatrix:
         self._rows, self._blocks = numbering.rows, numbering.unknowns
         self.extended, self._clock, self.version = extended, clock, 0
         # the summand of shift and soften on the diagonal, and whether that is zero
-        self._added, self._shift, self._plain = unknowns.zeros(), 0.0, True
+        self._added, self._plain = unknowns.zeros(), True
         # K̂ by entries: its copy, whether it is up to date, its diagonal, and whether that is without the summand
         self._entries: EntryCopy | None = None
         self._converted, self._entries_plain = False, False
@@ -79,14 +79,15 @@ class KktMatrix:
         self.version += 1
         self._converted = self._formed = False
         self._added.set(0.0)
-        self._shift, self._plain = 0.0, True
+        self._plain = True
 
-    def shift(self, shift: float) -> None:
-        """Sets the δ = ``shift`` of the δI added to the matrix in displacements and poses."""
+    def shift(self, shift: float, *, weighted: bool = False) -> None:
+        """Sets the δ = ``shift`` of the δI added to the matrix in displacements and poses, or δM, M their weights."""
         self.version += 1
-        self._shift, self._plain = shift, self._plain and shift == 0.0
+        self._plain = self._plain and shift == 0.0
         parts = self._blocks.restrict(self._added.array_w)
-        parts.nodes[:] = parts.poses[:] = shift
+        nodes, poses = self._unknowns.shift_weights if weighted else (1.0, 1.0)
+        parts.nodes[:], parts.poses[:] = shift * nodes, shift * poses
         del parts  # gives the vector's values back
         if self._formed:
             self._add_to_diagonal()
@@ -133,7 +134,10 @@ class KktMatrix:
         rows = PETSc.IS().createBlock(per_node, nodes, comm=self._rows.comm)
         stiffness = self.extended.createSubMatrix(rows, rows)
         stiffness.scale(self._unknowns.unit_u**2)
-        stiffness.shift(self._shift)
+        if not self._plain:
+            diagonal = stiffness.getDiagonal()
+            diagonal.array_w[:] += self._blocks.restrict(self._added.array_r).nodes
+            stiffness.setDiagonal(diagonal)
         return stiffness
 
     def _add_to_diagonal(self) -> None:

@@ -237,8 +237,7 @@ class EquilibriumPoint:
     @property
     def unstable_under_control(self) -> int:
         """The same number with the controlled quantity held; along a path, the displacement of the force's point."""
-        held = self.control.constrained or self.control.along_path
-        return self.stability.under_displacement if held else self.stability.under_load
+        return self.stability.under(self.control)
 
     def scaled(self, factor: float) -> EquilibriumPoint:
         """The same equilibrium with ``factor`` times its tangent."""
@@ -297,7 +296,8 @@ class Linearisation:
             raise NotConverged("the linear solver stalled", iterations)
         tangent, rate = control.rates(system, right, x)
         stability = control.stability(inertia.negative - system.negative_where_stable, tangent, rate)
-        state = system.without_self_stress(self.state)
+        unstable = stability.under(control) > 0
+        state = replace(system.without_self_stress(self.state), unstable=unstable)
         touching = system.touching(self.state)
         return EquilibriumPoint(state, control, tangent, rate, stability, iterations, tuple(residuals), self, touching)
 

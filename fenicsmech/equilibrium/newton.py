@@ -9,8 +9,9 @@ constraints. If the matrix has more negative eigenvalues than there are multipli
 grows until it does (every pressure of near-incompressible links counts as a multiplier: E has a maximum there); close
 to an equilibrium δ stays zero, so that unstable equilibria on the path are found and reported as such. There a step
 that turns stiff links by an angle φ strains them by φ², which may raise the residual of soft motions by orders of
-magnitude until the next step undoes it: these iterations converge as long as steps that raise it become shorter. From
-an unstable equilibrium descent would only lead away. Merit of a step: the augmented Lagrangian
+magnitude until the next step undoes it. From an unstable equilibrium, where descent would only lead away, these
+iterations converge as long as steps that raise it become shorter; from a stable one they descend instead, unless the
+residual stays small and rises but once. Merit of a step: the augmented Lagrangian
 
     Φ(s) = E(s) − λᵀC + ½ ρ_m |C + cλ|²  at the new multipliers λ, with the compliance c of joints,
 
@@ -30,6 +31,8 @@ again.
 
 Where links may touch obstacles a step linearises the gaps and finds the points that touch (see ``active_set``).
 
+Links that spin between ball joints, where loads alone resist, are held and turned step by step (see ``spinning``).
+
 Across a path (see ``control``) equilibria of any stability are wanted and a good guess is near: steps are taken in
 full, moved into the plane by bordering; where they diverge, a shorter step along the path is tried instead of descent.
 
@@ -41,23 +44,27 @@ the watchdog (Mathematical Programming Studies 16, 1982); Deuflhard on the simpl
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 from petsc4py import PETSc
 
-from fenicsmech.collective import agreed
+from fenicsmech.collective import agreed, from_one
 from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.control import Control, PathPlane
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
-from fenicsmech.equilibrium.solver import EquilibriumMethod, EquilibriumSolver
+from fenicsmech.equilibrium.solver import STEP, EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
 from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.errors import not_negative
 from fenicsmech.log import logger
 
 _log = logger(__name__)
-_LEAST_SHIFT = 1e-9  # in units of the mean stiffness; slender links bend with 1e-6 of it and less
+_LEAST_SHIFT = 1e-9  # first, in units of the mean stiffness; slender links bend with 1e-6 of it and less
+_FLOOR_OF_SHIFTS = 1e-13  # likewise, to which they fall from iteration to iteration
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +87,10 @@ class PrimalDualNewton(EquilibriumMethod):
             stability and the tangent of the path; 0: never.
         path_iterations: maximum number of iterations of an arc-length step, after which a shorter one is tried.
         divergence: growth of the residual, over its least value or ``near``, at which a shorter step is tried too.
-        contraction: near an equilibrium, length of a step that raises the residual over that of the last one that did,
-            above which steps descend.
+        contraction: from an unstable equilibrium to one near, length of a step that raises the residual over that of
+            the last one that did, above which steps descend.
+        turns: of links whose spin loads or obstacles resist, from one equilibrium with held spins to the next.
+        loose: stiffness left in a spin, over the mean one of the links, below which it is held and turned so.
 
     Raises:
         DescriptionError: a limit is not a positive number, a number of iterations not a whole one, or ``reuse_factor``
@@ -101,6 +110,8 @@ class PrimalDualNewton(EquilibriumMethod):
     path_iterations: int = 10
     divergence: float = 1e3
     contraction: float = 0.5
+    turns: int = 20
+    loose: float = 1e-8
 
     def __post_init__(self) -> None:
         super().__post_init__(
@@ -112,22 +123,37 @@ class PrimalDualNewton(EquilibriumMethod):
             halvings_inverted=1,
             watchdog=0,
             path_iterations=1,
+            turns=1,
         )
         not_negative("reuse_factor of Newton's method", self.reuse_factor)
 
     def solver(self, system: EquilibriumSystem) -> NewtonSolver:
-        return NewtonSolver(system, self)
+        return SpinningSolver(system, self) if system.spinning.spins else NewtonSolver(system, self)
 
 
 class NewtonSolver(EquilibriumSolver):
     """Newton's method for one system."""
 
     options: PrimalDualNewton
+    _held = False  # whether spins that loads or obstacles may resist are
+
+    def __init__(self, system: EquilibriumSystem, options: PrimalDualNewton) -> None:
+        super().__init__(system, options)
+        self._moved = system.moved
+
+    @property
+    def turning(self) -> NewtonSolver | None:
+        """The same solver with steps that turn links as rotations (``turning``); None if this is that one."""
+        if self._moved == self.system.turned:
+            return None
+        other = copy(self)
+        other._moved = self.system.turned
+        return other
 
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         system, options, path = self.system, self.options, control.along_path
         limit, least = options.path_iterations if path else options.iterations, start.minimum_shift
-        state, residual = start, system.residual(start, control)
+        state, residual = start, self.residual(start, control)
         best, not_better, line_search = (state, residual), 0, False
         diverged, raising = None, math.inf  # before the first step of any stability that raised the residual; length of
         # the last such step
@@ -145,14 +171,15 @@ class NewtonSolver(EquilibriumSolver):
                 if path:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
                 current = shift == least and not predicted and (contact is None or contact.current)
-                if not current or options.reuse_factor == 0.0:  # stability is of the true matrix
+                current = current and options.reuse_factor > 0.0
+                if not (current or self._held):  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
                 return self.accept(state, control, residual, residuals, iteration)
             if iteration == limit or self.factorisations >= most:
                 break
             near = path or (any_stability and (diverged is not None or residuals[-1] < options.near))
             predicted = last is not None and not near
-            system.linearise(state, control, residual, last if predicted else None, contact)
+            self.assemble(state, control, residual, last if predicted else None, contact)
             x, shift, null = self._direction(residual, least, last=shift, any_stability=near)
             singular = singular + 1 if null else 0
             plane = self.plane(state, control, residual)
@@ -174,9 +201,11 @@ class NewtonSolver(EquilibriumSolver):
                 return self.accept_best(*best, control, residuals, _explained(failure, singular))
             # pressures of mixed elements are stresses that the step solves for already
             last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
-            closer = residual.norm <= norm and self.relative(residual) < options.near
-            if near and not closer and not self.converged(residual, norm):
-                if length == 1.0 and (moved := system.size(step)) <= options.contraction * raising:
+            close = self.relative(residual) < options.near
+            if near and not (close and residual.norm <= norm) and not self.converged(residual, norm):
+                # once from a stable equilibrium too: just beyond a bifurcation small residuals hide large motions
+                kept = length == 1.0 and (start.unstable or (close and diverged is None))
+                if kept and (moved := system.size(step)) <= options.contraction * raising:
                     diverged, raising = diverged or before, moved
                 else:
                     # no contraction: near a limit or bifurcation point, where only descent makes progress
@@ -194,6 +223,14 @@ class NewtonSolver(EquilibriumSolver):
                 residual, norm = self._again(state, control), math.inf
         return self.accept_best(*best, control, residuals, _explained(self.exhausted(residuals, iteration), singular))
 
+    def residual(self, state: State, control: Control) -> Residual:
+        """The residual that steps bring to zero."""
+        return self.system.residual(state, control)
+
+    def assemble(self, state: State, control: Control, residual: Residual, last, contact) -> None:
+        """The matrix of the next step."""
+        self.system.linearise(state, control, residual, last, contact)
+
     def _with_contact(
         self, contact: ActiveSet, x: PETSc.Vec, residual: Residual, plane: PathPlane | None = None
     ) -> PETSc.Vec | None:
@@ -207,7 +244,7 @@ class NewtonSolver(EquilibriumSolver):
         system.load(state)
         if system.contact is not None:
             system.contact.start(state.load_factor)
-        return system.residual(state, control)
+        return self.residual(state, control)
 
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_stability: bool
@@ -218,9 +255,12 @@ class NewtonSolver(EquilibriumSolver):
 
         δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
-        shift, following, null = least, max(_LEAST_SHIFT, last / 3.0), False
+        shift, following, null = least, _LEAST_SHIFT, False
+        if last > least:
+            following = max(last / 3.0, 8.0 * least, _FLOOR_OF_SHIFTS)
         for _ in range(self.options.shifts):
-            x = self.try_solve(residual.vector, self.step_accuracy(residual)) if self.factor(shift) else None
+            factored = self.factor(shift, least=shift == least)
+            x = self.try_solve(residual.vector, self.step_accuracy(residual)) if factored else None
             if x is not None and shift == least:
                 null = self.linear.known_inertia().zero > 0
             if x is not None and (any_stability or self.descends()):
@@ -235,8 +275,8 @@ class NewtonSolver(EquilibriumSolver):
         iteration, system, options = len(residuals), self.system, self.options
         if not system.size(step) <= options.largest_turn:
             raise self.exhausted(residuals, iteration)
-        state = system.moved(state, step)
-        residual = system.residual(state, control)
+        state = self._moved(state, step)
+        residual = self.residual(state, control)
         if not math.isfinite(residual.norm):
             raise NotConverged("elements are inverted", iteration)
         if self.relative(residual) > options.divergence * max(min(residuals), options.near):
@@ -264,11 +304,11 @@ class NewtonSolver(EquilibriumSolver):
             length = system.size(correction)
             if not length <= self.options.reuse_factor * size:
                 break
-            following = system.moved(state, correction)
-            found = system.residual(following, control)
+            following = self._moved(state, correction)
+            found = self.residual(following, control)
             if not (found.norm < residual.norm or self.converged(found, residual.norm)):
                 system.load(state)
-                return state, system.residual(state, control), before
+                return state, self.residual(state, control), before
             state, residual, before, size = following, found, residual.norm, length
         return state, residual, before
 
@@ -279,9 +319,9 @@ class NewtonSolver(EquilibriumSolver):
         system = self.system
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
         for _ in range(self.options.halvings_inverted):
-            trial = system.moved(state, step.scaled(length))
+            trial = self._moved(state, step.scaled(length))
             if math.isfinite(system.elastic_energy()):
-                return trial, system.residual(trial, control), length
+                return trial, self.residual(trial, control), length
             length *= 0.5
         raise NotConverged("every step along the Newton direction inverts elements", iteration + 1)
 
@@ -296,10 +336,10 @@ class NewtonSolver(EquilibriumSolver):
         before = self._merit(state, control, *towards)
         length = min(1.0, self.options.largest_turn / max(system.size(step), 1e-300))
         for _ in range(self.options.halvings):
-            trial = system.moved(state, step.scaled(length))
+            trial = self._moved(state, step.scaled(length))
             after = self._merit(trial, control, *towards)
             if math.isfinite(after):
-                new = system.residual(trial, control)
+                new = self.residual(trial, control)
                 if after < before or new.norm < 0.9 * residual.norm:
                     return trial, new, length
             length *= 0.5
@@ -315,6 +355,138 @@ class NewtonSolver(EquilibriumSolver):
             gap = control.gap(system, state) / system.joints.length
             value += force * control.prescribed + 0.5 * stiffness * gap**2
         return agreed(system.comm, value)
+
+
+class SpinningSolver(NewtonSolver):
+    """Newton's method where loads or obstacles may resist spins.
+
+    Loose spins, which hardly anything resists at the last equilibrium, are held while all else comes to equilibrium,
+    and turned from one such equilibrium to the next; so are all where the plain iteration fails. The hold's moments μ
+    fall by Newton's method in the few angles: downhill, and no farther than half of the last turn once μ has changed
+    sign.
+    """
+
+    def iterate(self, start: State, control: Control) -> EquilibriumPoint:
+        if control.along_path:  # whose plane fixes the spin
+            return super().iterate(start, control)
+        used = 0
+        if not start.loose:
+            try:
+                return self._spun(super().iterate(start, control))
+            except NotConverged as failure:
+                used = failure.iterations
+                self._again(start, control)
+        try:
+            point = self._turned(start, control)
+        except NotConverged as failure:
+            raise NotConverged(failure.reason, used + failure.iterations) from failure
+        return self._spun(replace(point, iterations=used + point.iterations))
+
+    def _turned(self, state: State, control: Control) -> EquilibriumPoint:
+        """The equilibrium found by turns between those with held spins."""
+        system, options = self.system, self.options
+        residuals, iterations, before = list[float](), 0, math.inf
+        largest, last = options.largest_turn, None  # moments and length of the last turn
+        for _ in range(options.turns):
+            self._held = True
+            try:
+                held = super().iterate(state, control)
+            except NotConverged as failure:
+                raise NotConverged(failure.reason, iterations + failure.iterations) from failure
+            finally:
+                self._held = False
+            state, iterations, residuals = held.state, iterations + held.iterations, [*residuals, *held.residuals]
+            residual = self._again(state, control)
+            holds = system.holds(state)
+            if self.converged(residual, before) or not holds:
+                at = self.linearise(state, control, residual, iterations=iterations)
+                return at.point(residuals, iterations, tolerance=STEP)
+            before, iterations = residual.norm, iterations + 1
+            moments = np.array([hold.dot(residual.vector) / hold.dot(hold) for hold in holds])
+            if last is not None and len(moments) == len(last[0]) and moments @ last[0] < 0.0:
+                largest = 0.5 * last[1]
+            step = self._turn(state, control, residual, moments, largest)
+            last = moments, min(system.size(step), largest)
+            _log.debug("moments %s turn links by %.1e", moments, last[1])
+            state, _, _ = self._full_step(state, control, step, residual, iterations)
+        raise NotConverged(f"links between ball joints still turn after {options.turns} turns", iterations)
+
+    def _turn(self, state: State, control: Control, residual: Residual, moments: np.ndarray, largest: float) -> Step:
+        """The step x by which spins turn downhill under the ``moments`` μ of holds, each mode by ``largest`` at most.
+
+            x = S M⁻¹ μ,     S = (K + H Hᵀ)⁻¹ H,     M = I − Hᵀ S
+
+        Modes of negative eigenvalues of M turn by ``largest``.
+        """
+        system = self.system
+        system.linearise(state, control, residual, None, system.contact, held=True)
+        # zero-energy modes other than spins need the least shift
+        if not (self.factor(0.0) and self.linear.inertia().zero == 0) and not self.factor(state.minimum_shift):
+            raise NotConverged("the KKT matrix with held spins cannot be factored")
+        holds = system.holds(state)
+        responses = [x for hold in holds if (x := self.try_solve(hold, STEP)) is not None]
+        if len(responses) < len(holds):
+            raise NotConverged("the linear solver stalled")
+        left = np.eye(len(holds)) - np.array([[hold.dot(x) for x in responses] for hold in holds])
+        # of one process: decisions depend on their signs
+        values, modes = from_one(system.comm, lambda: np.linalg.eigh(0.5 * (left + left.T)))
+        steps = []
+        for value, mode in zip(values, modes.T, strict=True):
+            x = system.unknowns.zeros()
+            for factor, response in zip(mode, responses, strict=True):
+                x.axpy(float(factor), response)
+            own, moment = self.newton_step(x, None), float(mode @ moments)
+            farthest = largest / max(system.size(own), 1e-300)
+            amplitude = farthest if value <= 0.0 else min(abs(moment) / value, farthest)
+            steps.append(own.scaled(math.copysign(amplitude, moment)))
+        return reduce(add, steps)
+
+    def _spun(self, point: EquilibriumPoint) -> EquilibriumPoint:
+        """``point``, whether its spins are loose, and if so its tangent without them.
+
+        The stiffness left in a spin is 1 / hᵀ K⁻¹ h.
+        """
+        state, holds = point.state, self.system.holds(point.state)
+        loose = len(holds) < len(self.system.spinning.spins)
+        for hold in holds:
+            x = self.try_solve(hold, STEP)
+            loose = loose or x is None or not abs(hold.dot(x)) * self.options.loose < 1.0
+        tangent = self.system.spinning.unspun(state, point.tangent) if loose else point.tangent
+        return replace(point, state=replace(state, loose=loose), tangent=tangent)
+
+    def residual(self, state: State, control: Control) -> Residual:
+        residual = super().residual(state, control)
+        if not self._held:
+            return residual
+        vector = residual.vector
+        for hold in self.system.holds(state):
+            vector.axpy(-hold.dot(vector) / hold.dot(hold), hold)
+        return replace(residual, norm=vector.norm())
+
+    def assemble(self, state, control, residual, last=None, contact=None) -> None:
+        self.system.linearise(state, control, residual, last, contact, held=self._held)
+
+    def accept(self, state, control, residual, residuals, iterations):
+        """While spins are held, the state is all that is asked for."""
+        if self._held:
+            return _Held(state, tuple(residuals), iterations)
+        return super().accept(state, control, residual, residuals, iterations)
+
+    def accept_best(self, best, residual, control, residuals, failure):
+        if not self._held:
+            return super().accept_best(best, residual, control, residuals, failure)
+        if not residual.norm <= self.roundoff(residual) < math.inf:
+            raise failure
+        return _Held(best, tuple(residuals[: failure.iterations + 1]), failure.iterations)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """An equilibrium with held spins."""
+
+    state: State
+    residuals: tuple[float, ...]
+    iterations: int
 
 
 def _explained(failure: NotConverged, singular: int) -> NotConverged:

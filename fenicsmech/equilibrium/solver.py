@@ -26,7 +26,7 @@ from fenicsmech.errors import counted, expect, set_options
 _STRETCHED = 5e-3  # motion over the mechanism's length, about an element's size, that rounds u as F = I + ∇u is
 _NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
 _ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
-_STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
+STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,11 +77,16 @@ class EquilibriumSolver(ABC):
         """The linear solver, made for the first matrix and kept."""
         return self.options.linear.solver(self.system)
 
+    @property
+    def turning(self) -> EquilibriumSolver | None:
+        """A solver whose steps turn links instead of straining them, which takes longer; None if there is none."""
+        return None
+
     def solve(self, start: State, control: Control) -> EquilibriumPoint:
         """The equilibrium near ``start`` under ``control``.
 
         Args:
-            start: first guess; its least shift is that of all KKT matrices.
+            start: first guess; its least shift is that of all KKT matrices, and equilibria as ``unstable`` are wanted.
             control: the prescribed value.
 
         Raises:
@@ -121,11 +126,15 @@ class EquilibriumSolver(ABC):
 
     # -- parts of iterations -----------------------------------------------------------------------------------
 
-    def factor(self, shift: float) -> bool:
-        """Factors the KKT matrix last linearised with a ``shift``; whether that could be done."""
+    def factor(self, shift: float, *, least: bool = True) -> bool:
+        """Factors the KKT matrix last linearised with a ``shift``; whether that could be done.
+
+        The ``least`` one, which zero-energy modes need, has the weights of ``ScaledUnknowns``: what is less than the
+        stiffness of a stiff link would hold a soft one.
+        """
         self.factorisations += 1
         with self.system.clock.phase("factor"):
-            self.system.kkt.shift(shift)
+            self.system.kkt.shift(shift, weighted=least)
             return self.linear.refactor()
 
     def try_solve(self, right: PETSc.Vec, tolerance: float) -> PETSc.Vec | None:
@@ -164,26 +173,28 @@ class EquilibriumSolver(ABC):
         """
         relative = self.relative(residual)
         enough = 1e-3 * self.options.tolerance / max(relative, self.options.tolerance)
-        return min(max(0.1 * relative, enough, _STEP), 1e-3)
+        return min(max(0.1 * relative, enough, STEP), 1e-3)
 
     def converged(self, residual: Residual, before: float = 0.0, *, noise: float = 0.0) -> bool:
         """Whether joints are closed and the residual is small relative to the forces, or rounding that no longer falls.
 
         Joints count as closed within 1e-10 of the mechanism's length, or rad: unbounded reactions would hide wider
         gaps. Rounding must have stopped falling, to no less than a quarter of ``before``: soft springs and modes
-        respond to residuals below the rounding of stiff links. ``before`` is the norm of the residual one iteration
-        ago, 0 if this iteration is the last one; ``noise`` is that of other rounding errors of the residual.
+        respond to residuals below the rounding of stiff links. Nor may it rise to more than twice that: then links that
+        turn are strained by the last step, which the next one undoes. ``before`` is the norm of the residual one
+        iteration ago, 0 if this iteration is the last one; ``noise`` is that of other rounding errors of the residual.
         """
         if residual.norm <= self.options.tolerance * residual.forces < math.inf and residual.gap <= 1e-10:
             return True
-        return 0.25 * before < residual.norm <= max(self._rounding(residual), noise) < math.inf
+        steady = 0.25 * before < residual.norm and (not before or residual.norm <= 2.0 * before)
+        return steady and residual.norm <= max(self._rounding(residual), noise) < math.inf
 
     def accept(
         self, state: State, control: Control, residual: Residual, residuals: Sequence[float], iterations: int
     ) -> EquilibriumPoint:
         """The equilibrium, its stability and tangent from the matrix last factored."""
         at = Linearisation(self.system, self.linear, state, control, residual)
-        return at.point(residuals, iterations, tolerance=_STEP)
+        return at.point(residuals, iterations, tolerance=STEP)
 
     def accept_best(
         self, best: State, residual: Residual, control: Control, residuals: list[float], failure: NotConverged
@@ -195,8 +206,7 @@ class EquilibriumSolver(ABC):
 
             r · x ≤ 1e-4 forces |x|,     K x = r.
         """
-        limit = min(_ROUNDING * residual.forces, self.options.roundoff * self.system.unknowns.unit)
-        if not residual.norm <= limit < math.inf:
+        if not residual.norm <= self.roundoff(residual) < math.inf:
             raise failure
         at = self.linearise(best, control, iterations=failure.iterations)
         x = at.solve(at.residual.vector)
@@ -205,7 +215,11 @@ class EquilibriumSolver(ABC):
         if not (motion <= _NO_MOTION or work <= _ROUNDING * at.residual.forces * motion):
             raise failure
         residuals = [*residuals[: failure.iterations], self.relative(at.residual)]
-        return at.point(residuals, failure.iterations, tolerance=_STEP)
+        return at.point(residuals, failure.iterations, tolerance=STEP)
+
+    def roundoff(self, residual: Residual) -> float:
+        """The largest residual that counts as rounding where the KKT matrix is nearly singular."""
+        return min(_ROUNDING * residual.forces, self.options.roundoff * self.system.unknowns.unit)
 
     def exhausted(self, residuals: Sequence[float], iterations: int) -> NotConverged:
         """The failure after the last iteration."""

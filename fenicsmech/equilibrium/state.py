@@ -25,8 +25,10 @@ class State:
         force: magnitude f of the controlled force.
         motors: motor value per connection.
         load_factor: σ of the constant loads and effects, 0 … 1.
-        minimum_shift: least shift δ of the KKT matrix, which zero-energy modes need, in units of the mean stiffness.
+        minimum_shift: least shift δ of the KKT matrix, which zero-energy modes need, in units of the links' stiffness.
         constant: magnitudes f_k of the constant loads, which act times σ.
+        unstable: whether the last equilibrium on the way here was unstable under its control.
+        loose: whether links that loads or obstacles may keep from spinning could spin all but freely there.
     """
 
     u: np.ndarray
@@ -37,6 +39,8 @@ class State:
     load_factor: float = 1.0
     minimum_shift: float = 0.0
     constant: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    unstable: bool = False
+    loose: bool = True
 
     @property
     def has_reactions(self) -> bool:

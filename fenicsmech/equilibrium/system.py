@@ -28,10 +28,12 @@ from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.border import BorderTerms, PointLoad
 from fenicsmech.equilibrium.control import Control
 from fenicsmech.equilibrium.kkt import KktMatrix, create_extended_matrix
+from fenicsmech.equilibrium.spinning import SpinningLinks
 from fenicsmech.equilibrium.state import State, Step, load_fields
+from fenicsmech.equilibrium.turning import TurningLink, TurningLinks
 from fenicsmech.equilibrium.unknowns import Numbering, ScaledUnknowns
 from fenicsmech.log import Clock
-from fenicsmech.multibody import IdleSpin, InterfaceMap, JointSystem, PosePotential
+from fenicsmech.multibody import InterfaceMap, JointSystem, PosePotential, Spin
 
 _SHARED = ("u", "multipliers", "force", "motors", "load_factor")  # of states and steps
 
@@ -68,11 +70,13 @@ class EquilibriumSystem:
         elastic: the flexible links.
         interfaces: interface nodes as functions of poses.
         joints: the constraints.
+        links: bodies and nodes of each flexible link.
         controlled: the load whose magnitude f is controlled.
         loads: constant ones, whose magnitudes states hold.
         potentials: of body poses.
         compliances: c by constraint row; 0 where none is given.
         idle: spins that nothing but obstacles resists, whose gauge K fixes where their links touch none.
+        resisted: spins that loads or obstacles may resist, each with the owned nodes of its flexible links.
         one_sided: constraints on links, whose energy is in that of the links.
         clock: of the phases.
         comm: the processes that share the links.
@@ -82,6 +86,7 @@ class EquilibriumSystem:
         blocks: of the unknowns.
         unknowns: x and G, at the poses of the last ``residual``.
         kkt: the KKT matrix last linearised; take it before another ``residual``.
+        spinning: links whose spins loads or obstacles may resist.
         surfaces: of ``one_sided``.
         contact: the points of these; None without them.
     """
@@ -91,12 +96,14 @@ class EquilibriumSystem:
         elastic: ElasticBody,
         interfaces: InterfaceMap,
         joints: JointSystem,
+        links: Sequence[TurningLink],
         *,
         controlled: PointLoad,
         loads: Sequence[PointLoad] = (),
         potentials: Sequence[PosePotential] = (),
         compliances: Mapping[int, float] = MappingProxyType({}),
-        idle: Sequence[IdleSpin] = (),
+        idle: Sequence[Spin] = (),
+        resisted: Sequence[tuple[Spin, np.ndarray]] = (),
         one_sided: Sequence[OneSided] = (),
         clock: Clock,
         comm: MPI.Comm,
@@ -106,6 +113,8 @@ class EquilibriumSystem:
         self.controlled, self.clock, self.comm = controlled, clock, comm
         self.numbering = numbering = Numbering(comm, interfaces, joints, elastic.pressure)
         self.blocks = numbering.unknowns
+        self.spinning = SpinningLinks(resisted, interfaces, joints)
+        self._turning = TurningLinks(links, interfaces, joints, comm)
         self.idle, self.potentials, self.surfaces = tuple(idle), tuple(potentials), tuple(one_sided)
         self.compliances = np.array([compliances.get(row, 0.0) for row in range(joints.rows)])
         self._border = BorderTerms(
@@ -116,7 +125,9 @@ class EquilibriumSystem:
         with clock.phase("setup"):
             elastic.take(np.zeros(numbering.rows.links.count))
             elastic.update()
-            extended = create_extended_matrix(elastic, numbering, self._border.pattern(self.idle))
+            extended = create_extended_matrix(
+                elastic, numbering, self._border.pattern([*self.idle, *self.spinning.spins])
+            )
             self.unknowns = ScaledUnknowns(elastic, numbering, interfaces, joints, extended.getDiagonal().array_r)
             self.kkt = KktMatrix(elastic, numbering, self.unknowns, extended, clock=clock)
             self.contact = ActiveSet(one_sided, self.unknowns, comm) if one_sided else None
@@ -143,10 +154,24 @@ class EquilibriumSystem:
     # -- states --------------------------------------------------------------------------------------------
 
     def moved(self, state: State, step: Step) -> State:
-        """``state`` after ``step``: rotations back on their manifold, interface nodes on their bodies."""
+        """``state`` plus ``step``: rotations back on their manifold, interface nodes on their bodies."""
+        if self.spinning.spins:
+            u, poses = self.spinning.turned(state, step)
+        else:
+            u, poses = (
+                state.u + step.u,
+                self.joints.with_unknowns(state.poses, self.joints.unknowns(state.poses) + step.z),
+            )
+        return self._after(state, step, u, poses)
+
+    def turned(self, state: State, step: Step) -> State:
+        """``state`` after ``step``, the turns of links as rotations, and joints as far closed as by the step itself."""
+        return self._after(state, step, *self._turning.turned(state, step))
+
+    def _after(self, state: State, step: Step, u: np.ndarray, poses: np.ndarray) -> State:
+        """``state`` plus ``step`` with displacements ``u`` and ``poses``, loaded."""
         sums = {name: getattr(state, name) + getattr(step, name) for name in _SHARED}
-        poses = self.joints.with_unknowns(state.poses, self.joints.unknowns(state.poses) + step.z)
-        moved = replace(state, poses=poses, **sums)
+        moved = replace(state, poses=poses, **{**sums, "u": u})
         self.load(moved)
         return replace(moved, u=self.elastic.values())
 
@@ -175,11 +200,13 @@ class EquilibriumSystem:
         z = self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses)
         return Step(z=z, **{name: getattr(later, name) - getattr(earlier, name) for name in _SHARED})
 
-    def independent(self, step: Step) -> Step:
-        """``step`` without the displacements of nodes that bodies move. Local."""
+    def independent(self, step: Step, state: State) -> Step:
+        """``step`` to ``state`` without the displacements of nodes that bodies move, and of links that spin loosely:
+        these turn at once, whatever little changes. Local."""
         free, u = self.numbering.free, np.zeros_like(step.u)
         u[free] = step.u[free]
-        return replace(step, u=u)
+        step = replace(step, u=u)
+        return self.spinning.without(step) if state.loose else step
 
     def size(self, step: Step) -> float:
         """Largest displacement over the mechanism's length, or rotation, in ``step``."""
@@ -215,6 +242,11 @@ class EquilibriumSystem:
     def potential(self, state: State, force: float) -> float:
         """E_int + V − Σ loads − f a · u_P with ``force`` for f."""
         return self.elastic_energy() + self._border.pose_potential(state) - self._border.work(state, force)
+
+    def nodal_loads(self, state: State) -> np.ndarray:
+        """The nodal forces of loads on links at ``state``, without those of effects, (owned displacements,). Local."""
+        links, _ = self._border.load_forces(self._border.loads(state), state)
+        return links[self.numbering.rows.nodes.local]
 
     def volume_violation(self) -> float:
         """Norm of ∂E/∂p of the loaded state in scaled units."""
@@ -284,11 +316,14 @@ class EquilibriumSystem:
         residual: Residual,
         last: tuple[State, np.ndarray] | None = None,
         contact: ActiveSet | None = None,
+        *,
+        held: bool = False,
     ) -> None:
         """Brings ``kkt`` to the loaded ``state``, with the stress predicted by the ``last`` step if that is given.
 
         It is the state before the step and δu of owned nodes, linear in it on interface nodes too, (owned dofs,).
         Points touch obstacles as the state has it, or as ``contact`` expects; links with such points do not spin idly.
+        Spins that loads or obstacles may resist can be ``held``.
         """
         self.kkt.set_stiffness()
         moments = residual.moments
@@ -300,11 +335,27 @@ class EquilibriumSystem:
                 self._predicted_stress.take(last[0].u, last[1])
                 self._predicted_stress.add_stiffness(self.kkt.extended)
                 moments = _added(moments, self._moments(self._predicted_stress.forces()))
-        idle = self.idle
-        if idle and self.contact is not None:
-            touched = self.contact.touched(expected=contact is not None)
-            idle = tuple(spin for spin in idle if spin.links.isdisjoint(touched))
-        self.kkt.linearise(self._border.entries(state, control, moments, self.unknowns.scale, idle))
+        idle = self._now_idle(expected=contact is not None)
+        resisted = self.spinning.spins if held else ()
+        fixed = [*resisted, *(spin for spin in idle if spin not in resisted)]
+        self.kkt.linearise(self._border.entries(state, control, moments, self.unknowns.scale, fixed))
+
+    def _now_idle(self, *, expected: bool) -> list[Spin]:
+        """The idle spins whose links touch no obstacle, or are not ``expected`` to."""
+        if not self.idle or self.contact is None:
+            return list(self.idle)
+        touched = self.contact.touched(expected=expected)
+        return [spin for spin in self.idle if spin.links.isdisjoint(touched)]
+
+    def holds(self, state: State) -> list[PETSc.Vec]:
+        """h of each spin that loads, or obstacles in the loaded ``state``, resist: K + Σ h hᵀ is that of held ones."""
+        idle, found = self._now_idle(expected=False), []
+        resisted = [spin for spin in self.spinning.spins if spin not in idle]
+        for body, gauge in self._border.gauges(resisted, state, self.unknowns.scale):
+            border = np.zeros(self.blocks.border.size)
+            self.blocks.restrict_border(border).poses[self.joints.columns[body]] = gauge
+            found.append(self.unknowns.apply_transpose(np.zeros(self.numbering.rows.links.count), border))
+        return found
 
     # -- right-hand sides whose KKT solutions are rates of x -----------------------------------------------------
 

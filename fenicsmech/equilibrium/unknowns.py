@@ -44,6 +44,8 @@ from fenicsmech.elasticity import ElasticBody, PressureField
 from fenicsmech.equilibrium.state import Step
 from fenicsmech.multibody import InterfaceMap, JointSystem
 
+_SOFT = 0.1  # stiffness over the mean one, below which nodes are of soft links: in one material they vary by less
+
 
 @dataclass(frozen=True)
 class Block:
@@ -248,6 +250,8 @@ class ScaledUnknowns(UnknownMap):
         unit_u: the displacement that a unit of a scaled unknown stands for.
         units: D of this rank's unknowns, (local unknowns,).
         scale: D of the border, (border,).
+        shift_weights: of this rank's displacements, one, or less where they are of soft links, by their stiffness at
+            rest, (local displacements,); of poses, the geometric mean of the least of these and one.
     """
 
     def __init__(
@@ -259,10 +263,15 @@ class ScaledUnknowns(UnknownMap):
         diagonal: np.ndarray,
     ) -> None:
         self._blocks = blocks = numbering.unknowns
-        own = float(diagonal[numbering.free[blocks.nodes.local]].sum())
+        # prestrain that compresses can make diagonal terms negative
+        stiffness = np.abs(diagonal[numbering.free[blocks.nodes.local]])
+        own = float(stiffness.sum())
         mean = blocks.comm.allreduce(own) / blocks.nodes.size
         self.unit = float(np.sqrt(mean)) * joints.length
         self.unit_u = joints.length / self.unit
+        weights = np.minimum(stiffness / (_SOFT * mean), 1.0)
+        softest = blocks.comm.allreduce(float(weights.min(initial=1.0)), op=MPI.MIN)
+        self.shift_weights = weights, float(np.sqrt(softest))
         links = np.full(len(numbering.free), self.unit_u)
         if elastic.pressure is not None:
             links[blocks.pressures.local] = elastic.pressure_unit

@@ -13,8 +13,13 @@ Estimates η are of first order, sums over cells, and of quantities that converg
   error is d − √(d² − 2 d η): twice η at η = d/2, and beyond it finer elements have no equilibrium near. q′ is a
   difference over a small part of η along the tangent.
 - There is no such difference: the KKT matrix is singular that near, or an iterative solver stalls.
-- Contributions of cells cancel: |η| < ½ Σ |η_K|, those of the unloaded configuration, from which displacements count,
-  included. Then errors of a quarter in those of either sign make one of a half in η.
+- Errors cancel: |η| < ½ Σ ‖e_u‖_K ‖e_z‖_K in the norm of ∂²W/∂F∂F of each cell K, which bounds its contribution; those
+  of the unloaded configuration, from which displacements count, included. Contributions of cells cancel each other
+  then, or within cells the error of the displacement is nearly orthogonal to that of the adjoint. Errors of a quarter
+  in what adds and what takes away make one of a half in η.
+- Elements are too large: ‖e_z‖² is above a tenth of ‖∇z‖², as where η is above a tenth of a displacement of the links
+  alone. Springs and compliant interfaces move the quantity too, and hide how much of the links' part is missed. What
+  they miss, as how contraction varies over the thickness, the estimate of plane stress misses as well.
 - The force acts at a point of a flexible link, whose displacement has no limit (``point_forces``).
 """
 
@@ -38,7 +43,8 @@ class DoubtOptions:
     Attributes:
         turn: largest R, second-order part of an error over half of its first-order one.
         step: change of the unknown over the estimate for differences of its derivative, at most.
-        cancelled: least estimate over the sum of the absolute contributions of cells.
+        cancelled: least estimate over the bound of the contributions of cells.
+        unresolved: largest part of the adjoint's energy that the elements miss.
         growth: largest growth with each halving of the elements, by forces at points, over the estimate.
 
     Raises:
@@ -48,6 +54,7 @@ class DoubtOptions:
     turn: float = 0.4
     step: float = 0.05
     cancelled: float = 0.5
+    unresolved: float = 0.1
     growth: float = 0.2
 
     def __post_init__(self) -> None:
@@ -60,17 +67,18 @@ class Origin:
 
     Attributes:
         error: the estimate of its error.
-        spread: Σ |η_K| of that.
+        bound: of the contributions of cells to it.
     """
 
     error: float = 0.0
-    spread: float = 0.0
+    bound: float = 0.0
 
     @staticmethod
     def at(estimates: Estimates, solver: EquilibriumSolver, unloaded: Equilibrium, kind: ErrorKind) -> Origin:
         """Of the unloaded equilibrium, with its displacement as the unknown; raises as ``Estimates.at``."""
         with estimates.shaped(unloaded.design):
-            return Origin(*estimates.sums(adjoint_at(solver, unloaded), kind))
+            own = estimates.bounded(adjoint_at(solver, unloaded), kind)
+        return Origin(own.error, own.bound)
 
 
 def examined(
@@ -100,10 +108,10 @@ def examined(
     force = equilibrium.unknown is Unknown.FORCE
     with estimates.shaped(equilibrium.design):
         adjoint = adjoint_at(solver, equilibrium)
-        own, spread = estimates.sums(adjoint, kind)
+        own = estimates.bounded(adjoint, kind)
         slope = adjoint.by_control()
-        error = own + slope * origin.error if force else own - origin.error
-        spread += abs(slope) * origin.spread if force else origin.spread
+        error = own.error + slope * origin.error if force else own.error - origin.error
+        bound = own.bound + (abs(slope) * origin.bound if force else origin.bound)
         # the adjoint of the conjugate of a control is the rate along the path, but for its sign
         at = adjoint.at
         tangent = at.control.tangent(at.step(adjoint.x).scaled(-1.0 if force else 1.0))
@@ -120,8 +128,10 @@ def examined(
                 reasons.append(_NO_TANGENT)
             elif abs((there - slope) * slope) > options.step * options.turn * size:
                 reasons.append(TURNS[equilibrium.unknown])
-    if kind is ErrorKind.ELEMENTS and abs(error) < options.cancelled * spread:
+    if kind is ErrorKind.ELEMENTS and abs(error) < options.cancelled * bound:
         reasons.append("contributions of elements cancel")
+    if own.unresolved > options.unresolved:
+        reasons.append("elements too large")
     return error, tuple(reasons)
 
 

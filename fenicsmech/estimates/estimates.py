@@ -34,8 +34,9 @@ lowest degree in the height z above the mid-plane, as in hierarchic models of pl
     V = min over a, v of ½ ∫ E (a − h)² + μ b²/12 |∇a − Fᵀv|² + b⁴/720 G : C : G dV,     G = sym Fᵀ∇v,
 
 C that of plane stress: one linear problem on the same mesh at every equilibrium. h of the elements jumps between them,
-which a could not follow; its projection p to continuous fields, like that of recovered gradients, takes its place. V is
-the energy that 3D adds. It changes a quantity, to first order with its adjoint z,
+which a could not follow; its projection p to continuous fields, like that of recovered gradients, takes its place. Of
+laws with directions E of the first term is that across the plane, the other moduli are typical ones. V is the energy
+that 3D adds. It changes a quantity, to first order with its adjoint z,
 
     Q(space) − Q(plane stress) ≈ −∂V/∂u · z     at these a and v.
 
@@ -72,7 +73,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
@@ -151,6 +152,22 @@ class Equilibrium:
     unknown: Unknown
 
 
+@dataclass(frozen=True)
+class BoundedError:
+    """The correction η of a quantity.
+
+    Attributes:
+        error: η.
+        bound: of |η| by Cauchy and Schwarz in each cell, ∑ ‖e_u‖ ‖e_z‖ in the norm of ∂²W/∂F∂F of what strains it, or
+            |η_K| where that is larger; |η| in plane stress, whose estimate has no contributions of cells.
+        unresolved: ‖e_z‖² / ‖∇z‖², the part of the adjoint's own energy that the elements miss.
+    """
+
+    error: float
+    bound: float
+    unresolved: float = 0.0
+
+
 class Estimates:
     """Error estimates at equilibria of one model; forms are compiled when they are first needed."""
 
@@ -190,15 +207,13 @@ class Estimates:
         errors = [self._element_error if kind is ErrorKind.ELEMENTS else self._plane_stress_error for kind in kinds]
         return [error.of(adjoint) for error in errors]
 
-    def sums(self, adjoint: Adjoint, kind: ErrorKind) -> tuple[float, float]:
-        """The correction of a quantity from its adjoint, and Σ |η| of the contributions η of all cells to it.
-
-        That of plane stress has no contributions of cells: its absolute value. Raises as ``of``.
-        """
+    def bounded(self, adjoint: Adjoint, kind: ErrorKind) -> BoundedError:
+        """The correction of a quantity from its adjoint, and what bounds it. Raises as ``of``."""
+        elements = self._element_error.bounded(adjoint)
         if kind is ErrorKind.ELEMENTS:
-            return self._element_error.sums(adjoint)
+            return elements
         (error,) = self.of(adjoint, [kind])
-        return error, abs(error)
+        return replace(elements, error=error, bound=abs(error))
 
     @contextmanager
     def shaped(self, design: Design) -> Iterator[None]:
@@ -264,18 +279,43 @@ class ElementError:
         volume, measure = self._recovery.volume, elastic.free(2 * degree)
         self._right_hand_sides = [compile_form(ufl.inner(H, test) * volume * measure) for H in gradients]
         self._contributions = fem.Function(cellwise_space(elastic.mesh))
-        cell = ufl.TestFunction(self._contributions.function_space)
-        self._error = compile_form(self._second_derivatives(gradients, 2 * degree, cell))
+        self._error = compile_form(self._second_derivatives(2 * degree))
+
+    @cached_property
+    def _squares(self) -> list:
+        """Compiled: ‖e_u‖², ‖e_z‖² and ‖∇z‖² of each cell, in the norm of ∂²W/∂F∂F, of what strains it.
+
+        Rotations, whose part has the sign of the stress, are left out: F⁻ᵀ sym(Fᵀ H) in place of H.
+        """
+        (e_u, e_z), z = self._errors(), self._elastic.gradient(self._adjoint[0])
+        F = ufl.Identity(self._elastic.model.dim) + self._elastic.gradient(self._elastic.u)
+        e_u, e_z, z = (ufl.dot(ufl.inv(F).T, ufl.sym(ufl.dot(F.T, H))) for H in (e_u, e_z, z))
+        degree = 2 * max(self._elastic.order - 1, 1)
+        return [compile_form(self._elastic.curvature(self._cell * H, H, degree=degree)) for H in (e_u, e_z, z)]
+
+    @property
+    def _cell(self):
+        """The test function that is one in a cell, symbolic."""
+        return ufl.TestFunction(self._contributions.function_space)
+
+    def _errors(self) -> list:
+        """∇e_u and ∇e_z, symbolic."""
+        elastic = self._elastic
+        fields = (elastic.u, self._adjoint[0])
+        return [self._scale * (G - elastic.gradient(field)) for G, field in zip(self._recovered, fields, strict=True)]
 
     def of(self, adjoint: Adjoint) -> float:
         """Q(u) − Q(u_h), from the adjoint of Q."""
-        return self.sums(adjoint)[0]
+        return float(self._comm.allreduce(self._cellwise(adjoint).sum()))
 
-    def sums(self, adjoint: Adjoint) -> tuple[float, float]:
-        """Q(u) − Q(u_h), from the adjoint of Q, and Σ |η| of the contributions η of all cells to it."""
-        own = self._cellwise(adjoint)
-        error, spread = self._comm.allreduce(np.array([own.sum(), np.abs(own).sum()]))
-        return float(error), float(spread)
+    def bounded(self, adjoint: Adjoint) -> BoundedError:
+        """Q(u) − Q(u_h), from the adjoint of Q, and what bounds it."""
+        own = self._cellwise(adjoint).copy()
+        # laws may be indefinite where a cell is compressed or stretched much
+        e_u, e_z, z = (np.abs(assemble_vector(form, self._contributions)) for form in self._squares)
+        bounds = np.maximum(np.sqrt(e_u * e_z), np.abs(own))
+        error, bound, missed, energy = self._comm.allreduce(np.array([own.sum(), bounds.sum(), e_z.sum(), z.sum()]))
+        return BoundedError(float(error), float(bound), float(missed / energy) if energy else 0.0)
 
     def _cellwise(self, adjoint: Adjoint) -> np.ndarray:
         """The contributions of this rank's cells; a view."""
@@ -292,10 +332,10 @@ class ElementError:
         destroy_garbage(self._comm)
         return assemble_vector(self._error, self._contributions)
 
-    def _second_derivatives(self, gradients: Sequence, degree: int, cell) -> ufl.Form:
-        """The sum of all second derivatives of the energy, in the directions of the errors times ``cell``."""
-        elastic = self._elastic
-        A, B = (self._scale * (field - H) for field, H in zip(self._recovered, gradients, strict=True))
+    def _second_derivatives(self, degree: int) -> ufl.Form:
+        """The sum of all second derivatives of the energy, in the directions of the errors, of each cell."""
+        elastic, cell = self._elastic, self._cell
+        A, B = self._errors()
         A = cell * A
         form = elastic.curvature(A, B, degree=degree)
         if elastic.pressure is None:

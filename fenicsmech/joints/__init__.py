@@ -21,4 +21,4 @@ from fenicsmech.joints.joint import (
     coordinate_rate,
     free_coordinate,
 )
-from fenicsmech.joints.rotations import RIGID_SPACES, RigidSpace, cross_matrix
+from fenicsmech.joints.rotations import RIGID_SPACES, RigidSpace, across, cross_matrix

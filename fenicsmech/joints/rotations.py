@@ -70,6 +70,10 @@ class RigidSpace(ABC):
         """∂B/∂r_a, (rotation_size, rotation_size, 1 or 3)."""
 
     @abstractmethod
+    def turned(self, vector: np.ndarray, r: np.ndarray) -> np.ndarray:
+        """r after a further rotation by the ``vector`` φ, (1,) in the plane and (3,) in space: of R(φ) R(r)."""
+
+    @abstractmethod
     def converted(self, poses: np.ndarray) -> np.ndarray:
         """Poses (n, 3 or 7) in the plane or in space as poses here, (n, pose_size); space to plane by what is in it."""
 
@@ -142,6 +146,9 @@ class PlanarSpace(RigidSpace):
     def rotation_rates_gradient(self, pose):
         return np.zeros((1, 1, 1))
 
+    def turned(self, vector, r):
+        return vector + r
+
     def converted(self, poses):
         if poses.shape[1] == self.pose_size:
             return poses
@@ -200,6 +207,12 @@ class SpatialSpace(RigidSpace):
         # linear in q
         return np.array([self.rotation_rates(np.append(np.zeros(3), unit)) for unit in np.eye(4)])
 
+    def turned(self, vector, r):
+        # p ∘ q = (p₀ q₀ − p · q, p₀ q + q₀ p + p × q),  p = (cos ½|φ|, sin ½|φ| φ / |φ|)
+        half, (scalar, *rest) = 0.5 * np.linalg.norm(vector), r
+        w, v = np.cos(half), 0.5 * np.sinc(half / np.pi) * vector
+        return np.append(w * scalar - v @ rest, w * r[1:] + scalar * v + np.cross(v, rest))
+
     def converted(self, poses):
         if poses.shape[1] == self.pose_size:
             return poses
@@ -224,3 +237,10 @@ class SpatialSpace(RigidSpace):
 
 RIGID_SPACES = {2: PlanarSpace(), 3: SpatialSpace()}
 """Rigid-body coordinates by dimension."""
+
+
+def across(spin: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """ω × ``offsets`` (..., dim), ω (..., 1) in the plane and (..., 3) in space."""
+    if spin.shape[-1] == 1:
+        return spin * np.stack([-offsets[..., 1], offsets[..., 0]], axis=-1)
+    return np.cross(spin, offsets)

@@ -48,5 +48,5 @@ from fenicsmech.mechanism.shapes import (
     step_file,
     strip,
 )
-from fenicsmech.mechanism.strength import Basquin, Strength
+from fenicsmech.mechanism.strength import Allowable, Basquin, Strength, goodman
 from fenicsmech.mechanism.units import Units

@@ -49,11 +49,13 @@ POUND = 0.45359237  # kg
 _STRESS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "psi": PSI, "ksi": 1e3 * PSI, "Msi": 1e6 * PSI}
 _DENSITY = {"kg/m³": 1.0, "g/cm³": 1e3, "slug/ft³": POUND * 9.80665 / 0.3048**4}
 _RATIO = {"1": 1.0, "%": 0.01}
+_EXPANSION = {"1/K": 1.0, "µm/(m K)": 1e-6, "µin/(in °F)": 1.8e-6}
 
 QUANTITIES: dict[str, tuple[str, Mapping[str, float]]] = {
     "E": ("Young's modulus", _STRESS),
     "nu": ("Poisson's ratio", _RATIO),
     "density": ("density", _DENSITY),
+    "expansion": ("coefficient of linear thermal expansion", _EXPANSION),
     "yield_stress": ("yield stress", _STRESS),
     "yield_strain": ("strain at yield", _RATIO),
     "ultimate_stress": ("ultimate stress", _STRESS),
@@ -122,7 +124,7 @@ class Figure:
 
     @property
     def si(self) -> float:
-        """Its value in Pa, kg/m³ or without a dimension."""
+        """Its value in Pa, kg/m³, 1/K or without a dimension."""
         return self.value * QUANTITIES[self.name][1][self.unit]
 
 
@@ -162,6 +164,7 @@ class MaterialCard:
             self.name,
             law=law,
             density=None if density is None else units.density_of(density),
+            expansion=self._si("expansion"),
             strength=self._strength(units),
             units=units,
         )
@@ -195,7 +198,8 @@ def material(name: str | Path, *, units: Units = MILLIMETRES, nu: float | None =
         nu: Poisson's ratio, in place of that of the card.
 
     Returns:
-        the material, neo-Hookean with the modulus at small strain, with density and strength as far as known.
+        the material, neo-Hookean with the modulus at small strain, with density, thermal expansion and strength as far
+        as known.
         Poisson's ratio is 0.49 where the card says 0.5.
 
     Raises:

@@ -26,17 +26,19 @@ class Material:
         E, nu: Young's modulus (force per area) and Poisson's ratio of the law ``NeoHookean(E, nu)``.
         law: any law, instead of E and nu.
         density: mass per volume, for its weight; with forces in N and lengths in mm in t/mm³ (water: 1e-9).
+        expansion: coefficient of linear thermal expansion α, 1/K, for its ``Temperature``.
         strength: what it bears, if known.
         units: of its numbers, which a scene has to have; None for those of any scene.
 
     Raises:
-        DescriptionError: E ≤ 0, ν outside (−1, 0.5), the density not positive, or not numbers; a law and numbers are
-            given, or neither; the strength or the units are something else.
+        DescriptionError: E ≤ 0, ν outside (−1, 0.5), the density not positive, or not numbers, as the expansion; a law
+            and numbers are given, or neither; the strength or the units are something else.
     """
 
     name: str
     law: Law
     density: float | None
+    expansion: float | None
     strength: Strength | None
     units: Units | None
 
@@ -48,6 +50,7 @@ class Material:
         *,
         law: Law | None = None,
         density: float | None = None,
+        expansion: float | None = None,
         strength: Strength | None = None,
         units: Units | None = None,
     ) -> None:
@@ -65,9 +68,11 @@ class Material:
             raise DescriptionError(part, f"its law is {law!r}", "Give a law with its numbers: NeoHookean(E, nu)")
         if density is not None:
             density = positive(f"density of {part}", density)
+        if expansion is not None:
+            expansion = finite(f"expansion of {part}", expansion)
         expect(part, strength, Strength | None, "a strength", "Give Strength(…)")
         expect(part, units, Units | None, "a set of units", "Give Units(…)")
-        set_fields(self, name=name, law=law, density=density, strength=strength, units=units)
+        set_fields(self, name=name, law=law, density=density, expansion=expansion, strength=strength, units=units)
 
 
 ONYX = Material("Onyx", 1770.0, 0.42, density=1.2e-9)

@@ -82,8 +82,9 @@ class Effect(ABC):
         """The pressure on the faces of each link at the ends of its depth, which only space has."""
         return {}
 
-    def growth(self, model):
-        """The ``Stretch`` of each flexible link whose strain-free length differs from the drawn one.
+    def growth(self, model, links):
+        """The ``Stretch`` of each of the flexible ``links`` whose strain-free length differs from the drawn one; those
+        of effects of several classes multiply.
 
         Raises:
             DescriptionError: the ``ElasticModel`` does not support it.

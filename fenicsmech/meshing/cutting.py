@@ -12,8 +12,8 @@ unit only give the same numbers, and the same mesh but for rounding.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,14 +34,25 @@ class Grading:
         growth: of the element size per unit of distance from a small feature.
         gap_aspect: length over height of the elements in a narrow gap.
         least_gap_size: least element size in a gap over that next to it; bounds the number of elements there.
+        notch_segments: of a whole circle where the outline is concave, as at holes, notches and fillets, by dimension
+            of the mesh. There stress is largest, and quadratic elements get it to about 1 % (benchmarks/stress.py).
+        notch_radius: radius of curvature of splines, ellipses and tori over the element size, below which they count as
+            notches; arcs, cylinders and spheres always do.
+        notch_growth: of the element size per unit of distance from there.
+        least_notch_size: least element size there over that of the link; bounds the number of elements.
     """
 
     growth: float = 1.0
     gap_aspect: float = 4.0
     least_gap_size: float = 0.25
+    notch_segments: Mapping[int, int] = field(default_factory=lambda: {2: 40, 3: 40})
+    notch_radius: float = 2.0
+    notch_growth: Mapping[int, float] = field(default_factory=lambda: {2: 0.35, 3: 0.7})
+    least_notch_size: float = 0.02
 
 
 GRADING = Grading()
+_PARTS = {2: 16, 3: 8}  # of curves, or surfaces along each parameter, whose curvature varies
 
 
 def circle_segments(radius: float, size: float) -> int:
@@ -133,12 +144,15 @@ def mesh_fragments(
     holders = [[k for k, origin in enumerate(held) if piece in origin] for piece in link]
     if double := [numbers for numbers in holders if len(numbers) > 1]:
         raise request.overlap(*double[0][:2])
-    refinements = [*refinements, *_pin_refinements(sites, size, request.segments)]
-    field, dim = gmsh.model.mesh.field, bodies[0][0]
-    tag = field.add("MathEval")
-    field.setString(tag, "F", f"min({', '.join([repr(float(size)), *refinements])})" if refinements else repr(size))
-    field.setAsBackgroundMesh(tag)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    dim, free = bodies[0][0], [piece for piece, numbers in zip(link, holders, strict=True) if not numbers]
+    refinements = [
+        *refinements, *_pin_refinements(sites, size, request.segments), *_notch_refinements(link, free, size)
+    ]  # fmt: skip
+    sizes = gmsh.model.mesh.field
+    tag = sizes.add("MathEval")
+    sizes.setString(tag, "F", f"min({', '.join([repr(float(size)), *refinements])})" if refinements else repr(size))
+    sizes.setAsBackgroundMesh(tag)
     gmsh.model.mesh.generate(dim)
     gmsh.model.mesh.setOrder(2)  # puts the middles of edges on the curves and surfaces they belong to
     return _collect(dim, link, [numbers[0] if numbers else FREE for numbers in holders])
@@ -158,6 +172,141 @@ def _pin_refinements(sites: Sequence[InterfaceSite], size: float, segments: int)
         # just below the longest segment, whose number gmsh rounds
         expressions.append(f"{0.999 * longest!r} + {GRADING.growth} * {away}")
     return expressions
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """An arc, or a part of a cylinder or a sphere, on the boundary, or the one that osculates a part of it.
+
+    Attributes:
+        at: a point of it, (3,).
+        bend: from there to the centre, over the square of the radius, (3,).
+        axis: unit vector, zero for a sphere, (3,).
+        middle: of its points, (3,).
+        reach: to the farthest of them.
+    """
+
+    at: np.ndarray
+    bend: np.ndarray
+    axis: np.ndarray
+    middle: np.ndarray
+    reach: float
+
+    @classmethod
+    def of(cls, dim: int, tag: int, size: float) -> list[_Round]:
+        """Those of an entity of the boundary of a link of dimension ``dim``, meshed with elements of some ``size``.
+
+        Arcs, cylinders and spheres are round as wholes. Of other curves and surfaces, as ellipses, splines and tori,
+        the parts between lines of constant parameters count where they are sharp, a surface by its sharper curvature.
+        """
+        model, kind = gmsh.model, gmsh.model.getType(dim - 1, tag)
+        if kind in ("Line", "Plane"):
+            return []
+        low, high = (np.array(ends) for ends in model.getParametrizationBounds(dim - 1, tag))
+        grid = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 2 * _PARTS[dim] + 1)] * (dim - 1), indexing="ij"), -1)
+        flat = (low + (high - low) * grid).ravel().tolist()
+        points = np.reshape(model.getValue(dim - 1, tag, flat), (*grid.shape[:-1], 3))
+        slopes = np.reshape(model.getDerivative(dim - 1, tag, flat), (*grid.shape, 3))
+        seconds = np.reshape(model.getSecondDerivative(dim - 1, tag, flat), (*grid.shape[:-1], -1, 3))
+        seconds = seconds[..., : dim - 1, :]
+        # curvature along each parameter: the part of C'' along the normal, over |C'|²; none where these are singular
+        squares = np.einsum("...c,...c->...", slopes, slopes)[..., None]
+        if dim == 2:
+            normals = np.cross([0.0, 0.0, 1.0], slopes[..., 0, :])
+        else:
+            normals = np.cross(slopes[..., 0, :], slopes[..., 1, :])
+        sizes = np.linalg.norm(normals, axis=-1)
+        singular = sizes <= 1e-9 * sizes.max()
+        squares[singular], sizes[singular] = np.nan, np.nan
+        normals /= sizes[..., None]
+        bends = np.einsum("...ac,...c->...a", seconds, normals)[..., None] * normals[..., None, :] / squares
+        curvatures = np.linalg.norm(bends, axis=-1)
+
+        def osculating(k: tuple[int, ...], around: int, own: np.ndarray) -> _Round:
+            axis = np.array([0.0, 0.0, 1.0]) if dim == 2 else slopes[k][1 - around]
+            axis = np.zeros(3) if kind == "Sphere" else axis / np.linalg.norm(axis)
+            middle = 0.5 * (own.min(axis=0) + own.max(axis=0))
+            return cls(points[k], bends[k][around], axis, middle, float(np.linalg.norm(own - middle, axis=1).max()))
+
+        least, largest = (pick(curvatures.reshape(-1, dim - 1), axis=0) for pick in (np.nanmin, np.nanmax))
+        rounder = int(np.argmax(least))
+        even = 0.0 < largest[rounder] <= (1.0 + 1e-6) * least[rounder]
+        if even and (dim == 2 or kind == "Sphere" or largest[1 - rounder] <= 1e-6 * largest[rounder]):
+            return [osculating((_PARTS[dim],) * (dim - 1), rounder, points.reshape(-1, 3))]
+        found = []
+        for part in np.ndindex(*(_PARTS[dim],) * (dim - 1)):
+            own = tuple(slice(2 * k, 2 * k + 3) for k in part)
+            *sharpest, around = np.unravel_index(np.nanargmax(curvatures[own]), curvatures[own].shape)
+            k = tuple(2 * first + int(more) for first, more in zip(part, sharpest, strict=True))
+            if curvatures[k][around] * GRADING.notch_radius * size > 1.0:
+                found.append(osculating(k, int(around), points[own].reshape(-1, 3)))
+        return found
+
+    @property
+    def radius(self) -> float:
+        return 1.0 / float(np.linalg.norm(self.bend))
+
+    def is_concave(self, facets: np.ndarray, boundary: np.ndarray) -> bool:
+        """Whether its centre is not on the side of the link.
+
+        Args:
+            facets: corners of the segments or triangles that it is meshed with, (n, dim, 3).
+            boundary: those of the whole boundary, (m, dim, 3).
+        """
+        dim = boundary.shape[1]
+        own = facets[np.argmin(np.linalg.norm(facets.mean(axis=1) - self.at, axis=1))]
+        length = float(np.linalg.norm(np.ptp(own, axis=0)))
+        start = own.mean(axis=0) + 1e-3 * length * self.radius * self.bend
+        # a ray from inside crosses the boundary an odd number of times: start + t d = a + Σ u_k e_k
+        edges = (boundary[:, 1:] - boundary[:, :1])[..., :dim]
+        ray = np.array([0.6180339887, 0.7548776662, 0.5698402910])[:dim]
+        matrices = np.concatenate([np.broadcast_to(-ray, (len(edges), 1, dim)), edges], axis=1).transpose(0, 2, 1)
+        regular = np.abs(np.linalg.det(matrices)) > 1e-12 * length ** (dim - 1)
+        found = np.linalg.solve(matrices[regular], (start - boundary[regular, 0])[:, :dim, None])[..., 0]
+        crossed = (found > 0.0).all(axis=1) & (found[:, 1:].sum(axis=1) < 1.0)
+        return np.count_nonzero(crossed) % 2 == 0
+
+    @property
+    def away(self) -> str:
+        """A lower bound of the distance from it, as a gmsh expression."""
+        centre = self.at + self.bend * self.radius**2
+        along = " + ".join(
+            f"({float(a)!r}) * ({x} - ({float(c)!r}))" for a, x, c in zip(self.axis, "xyz", centre, strict=True)
+        )
+        return (
+            f"max(abs(sqrt(max(0, {_square_to(centre)} - ({along})^2)) - {self.radius!r}), "
+            f"sqrt({_square_to(self.middle)}) - {self.reach!r})"
+        )
+
+
+def _square_to(at: np.ndarray) -> str:
+    """The squared distance from a point, as a gmsh expression."""
+    return " + ".join(f"({x} - ({float(c)!r}))^2" for x, c in zip("xyz", at, strict=True))
+
+
+def _notch_refinements(link: Sequence[DimTag], free: Sequence[DimTag], size: float) -> list[str]:
+    """Element sizes, as gmsh expressions, at concave curves and surfaces on the boundary of what can deform."""
+    dim = link[0][0]
+    outer = sorted({abs(tag) for _, tag in gmsh.model.getBoundary(link, combined=True, oriented=False)})
+    own = {tag for _, tag in gmsh.model.getBoundary(free, combined=False, oriented=False)}
+    share, least = 2.0 * math.pi / GRADING.notch_segments[dim], size * GRADING.least_notch_size
+    rounds = [(tag, found) for tag in outer if tag in own for found in _Round.of(dim, tag, size)]
+    small = [(tag, found) for tag, found in rounds if share * found.radius < size]
+    if not small:
+        return []
+    gmsh.model.mesh.generate(dim - 1)
+    points, row_of = mesh_nodes()
+    facets = {}
+    for tag in outer:
+        _, _, (nodes,) = gmsh.model.mesh.getElements(dim - 1, tag)
+        facets[tag] = points[row_of[nodes.astype(np.int64)].reshape(-1, dim)]
+    gmsh.model.mesh.clear()
+    boundary = np.concatenate(list(facets.values()))
+    return [
+        f"{max(share * found.radius, least)!r} + {GRADING.notch_growth[dim]} * {found.away}"
+        for tag, found in small
+        if found.is_concave(facets[tag], boundary)
+    ]
 
 
 def _collect(dim: int, link: Sequence[DimTag], holders: Sequence[int]) -> LinkMesh:

@@ -33,4 +33,4 @@ from fenicsmech.multibody.points import (
 )
 from fenicsmech.multibody.potentials import DeadLoad, JointCoordinate, PosePotential, TravelSpring, spring_potentials
 from fenicsmech.multibody.rest_pose import RestEnding, RestSearch, RestTurn
-from fenicsmech.multibody.spins import IdleSpin, idle_spins
+from fenicsmech.multibody.spins import Spin, spins

@@ -42,10 +42,11 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
+from fenicsmech.joints import across
 from fenicsmech.mechanism import Configuration
 from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage
 from fenicsmech.multibody.potentials import PosePotential
-from fenicsmech.multibody.spins import IdleSpin
+from fenicsmech.multibody.spins import Spin
 
 
 @dataclass(frozen=True)
@@ -289,7 +290,7 @@ def count_freedom(
     poses: np.ndarray,
     motors: np.ndarray,
     springs: Sequence[PosePotential] = (),
-    idle: Sequence[IdleSpin] = (),
+    idle: Sequence[Spin] = (),
 ) -> Freedom:
     """Mobility and redundancy at ``poses`` (bodies, pose_size), motors at ``motors`` (connections,)."""
     dependent = _null_space(system.scaled_gradient(poses, motors).T)
@@ -330,7 +331,7 @@ class Motion:
 
     def at(self, body: int, offsets: np.ndarray) -> np.ndarray:
         """Velocities of points at ``offsets`` (n, dim) from the centre of a body, as placed now."""
-        return self.velocity[body] + _cross(self.spin[body], offsets)
+        return self.velocity[body] + across(self.spin[body], offsets)
 
     def fastest(self, length: float) -> float:
         """The largest velocity of a body's centre, or of a point at the distance ``length`` from it."""
@@ -354,7 +355,7 @@ def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> li
             z, velocity, spin = np.zeros(joints.size), np.zeros((len(poses), dim)), np.zeros((len(poses), turns))
             for body in bodies:
                 spin[body] = turn
-                velocity[body] = slide + _cross(turn, (places[body] - places[bodies[0]])[None])[0]
+                velocity[body] = slide + across(turn, places[body] - places[bodies[0]])
                 z[joints.columns[body]] = np.concatenate([velocity[body], space.rotation_rates(poses[body]) @ turn])
             basis.append((z, velocity, spin))
     parts = [np.array(part) for part in zip(*basis, strict=True)]
@@ -378,10 +379,3 @@ def _null_space(matrix: np.ndarray) -> np.ndarray:
 def _takes_part(vectors: np.ndarray) -> np.ndarray:
     """Mask of the entries that exceed rounding in any of some unit vectors, (n, size)."""
     return (np.abs(vectors) > 1e-6).any(axis=0)
-
-
-def _cross(spin: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """ω × ``offsets`` (n, dim)."""
-    if len(spin) == 1:
-        return spin[0] * np.column_stack([-offsets[:, 1], offsets[:, 0]])
-    return np.cross(spin, offsets)

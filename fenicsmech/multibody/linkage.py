@@ -117,6 +117,11 @@ class JointSystem:
         rows = [np.arange(end - count, end) for end, (_, count) in zip(ends, names, strict=True)]
         self._joint_rows = rows[: len(self.connections)]
         self._norm_rows = dict(zip(self.free_bodies, rows[len(self.connections) :], strict=True))
+        # equations between unit vectors or quaternions: x_b − x_a keeps the digits of small motions
+        self._products = np.ones(self.rows, dtype=bool)
+        for connection, own_rows in zip(self.connections, self._joint_rows, strict=True):
+            if connection.kind.shares_point:
+                self._products[own_rows[:dim]] = False
         own = zip(self.connections, self._joint_rows, strict=True)
         self.motor_rows = {c.motor: int(rows[-1]) for c, rows in own if c.motor is not None}
 
@@ -171,8 +176,8 @@ class JointSystem:
         for body, rows in self._norm_rows.items():
             residual[rows] = self.space.norm_residual(poses[body])
         if self.space.dim == 3:
-            # products of unit vectors and quaternions: their rounding of some ε would outweigh the smallest loads
-            residual[np.abs(self.row_scale * residual) <= 4.0 * np.finfo(float).eps] = 0.0
+            # their rounding of some ε would outweigh the smallest loads
+            residual[self._products & (np.abs(self.row_scale * residual) <= 4.0 * np.finfo(float).eps)] = 0.0
         return residual
 
     def gradient(self, poses: np.ndarray, motors: np.ndarray) -> np.ndarray:

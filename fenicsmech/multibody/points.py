@@ -48,6 +48,7 @@ class InterfaceMap:
         owned: number of owned nodes.
         block: displacements per node.
         unknown: whether each owned displacement is an unknown, (owned nodes, block).
+        positions: of all local nodes at the present rest shape, (nodes, dim).
         nodes: local eliminated nodes, owned and ghost, per body.
         offsets: X_i − c of these nodes.
     """
@@ -60,8 +61,8 @@ class InterfaceMap:
         self.block, self.owned = V.dofmap.index_map_bs, V.dofmap.index_map.size_local
         self.body = self._body_of_nodes()
         self.nodes = {int(b): np.flatnonzero(self.body == b) for b in np.unique(self.body[self.body >= 0])}
-        self._drawn = {b: drawn[nodes, : space.dim] - centres[b] for b, nodes in self.nodes.items()}
-        self.offsets = dict(self._drawn)
+        self._drawn = self.positions = drawn[:, : space.dim]
+        self.offsets = self._from_centres()
         self._mid_plane = np.zeros(len(self.body), dtype=bool)
         if space.dim < self.block:
             self._mid_plane = on_mid_plane(V.tabulate_dof_coordinates(), V.mesh.comm)
@@ -75,7 +76,11 @@ class InterfaceMap:
 
     def reshape(self, design: np.ndarray) -> None:
         """Takes the design at all local nodes, (nodes, dim): added to the drawn positions."""
-        self.offsets = {b: self._drawn[b] + design[nodes, : self.space.dim] for b, nodes in self.nodes.items()}
+        self.positions = self._drawn + design[:, : self.space.dim]
+        self.offsets = self._from_centres()
+
+    def _from_centres(self) -> dict[int, np.ndarray]:
+        return {b: self.positions[nodes] - self._centres[b] for b, nodes in self.nodes.items()}
 
     def _body_of_nodes(self) -> np.ndarray:
         """Body of every local node; a node may touch an interface cell only on another rank."""
@@ -89,6 +94,14 @@ class InterfaceMap:
         add_ghosts(marker)
         marker.x.scatter_forward()
         return np.rint(local[:, 0] / np.maximum(local[:, 1], 1.0)).astype(int) - 1
+
+    def nodal(self, u: np.ndarray) -> np.ndarray:
+        """A view of displacements ``u`` of owned nodes, flat, maybe followed by others: (owned nodes, dim)."""
+        return u[: self.owned * self.block].reshape(-1, self.block)[:, : self.space.dim]
+
+    def places(self, u: np.ndarray) -> np.ndarray:
+        """Of the owned nodes, displaced by ``u``, (owned nodes, dim)."""
+        return self.positions[: self.owned] + self.nodal(u)
 
     def place(self, poses: np.ndarray) -> None:
         """Sets the eliminated displacements from ``poses`` (bodies, pose_size)."""

@@ -1,4 +1,4 @@
-"""Idle spins: bodies between two ball joints turn about the line through these, and nothing resists.
+"""Spins: bodies between two ball joints turn about the line through these; in idle spins nothing resists.
 
 In kinematics this is a passive degree of freedom (L.-W. Tsai, Robot Analysis, Wiley 1999). Where two ball joints alone
 connect a set of bodies to the others, and nothing else acts on it, the Lagrangian L is invariant while the set turns as
@@ -30,10 +30,12 @@ from scipy.sparse.csgraph import connected_components
 from fenicsmech.mechanism import Link
 from fenicsmech.multibody.linkage import JointSystem, Linkage
 
+_ROUNDING = 1e-9  # distance of one place, over the mechanism's length
+
 
 @dataclass(frozen=True)
-class IdleSpin:
-    """Bodies that turn idly about the line through two ball joints.
+class Spin:
+    """Bodies that turn about the line through two ball joints.
 
     Attributes:
         system: joints and links as rigid bodies.
@@ -62,29 +64,63 @@ class IdleSpin:
         rates = joints.space.rotation_rates(poses[body]) @ self.line(poses)[1]
         return body, np.concatenate([np.zeros(joints.space.dim), rates])
 
+    def rates(self, joints: JointSystem, poses: np.ndarray) -> dict[int, np.ndarray]:
+        """n: the rate of the pose of each body, (pose_size,)."""
+        (point, axis), dim = self.line(poses), joints.space.dim
+        centres = {body: np.array(joints.bodies[body].centre) + poses[body, :dim] for body in self.bodies}
+        turns = {body: joints.space.rotation_rates(poses[body]) @ axis for body in self.bodies}
+        return {body: np.concatenate([np.cross(axis, centres[body] - point), turns[body]]) for body in self.bodies}
+
+    def angle(self, joints: JointSystem, poses: np.ndarray, z: np.ndarray) -> float:
+        """The mean turn about the line in a step ``z`` of the pose unknowns from ``poses``.
+
+        dq = B ω with Bᵀ B = ¼ I, so ω = 4 Bᵀ dq.
+        """
+        axis, dim, space = self.line(poses)[1], joints.space.dim, joints.space
+        own = [4.0 * (space.rotation_rates(poses[b]) @ axis) @ z[joints.columns[b]][dim:] for b in self.bodies]
+        return float(np.mean(own))
+
+    def turned(
+        self, joints: JointSystem, poses: np.ndarray, angle: float, points: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """``poses`` and ``points`` (n, 3) of the bodies after a turn about the line by ``angle``.
+
+        x ← p + R (x − p),     q ← (cos ½φ, sin ½φ n) ∘ q
+        """
+        (point, axis), space, poses = self.line(poses), joints.space, poses.copy()
+        turn = np.concatenate([np.zeros(3), [np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis])
+        for body in self.bodies:
+            t, q = poses[body, :3], poses[body, 3:]
+            rate = space.rotation_rates(poses[body]) @ axis
+            t += space.rotation_increment(turn) @ (np.array(joints.bodies[body].centre) + t - point)
+            q[:] = turn[3] * q + 2.0 * np.sin(0.5 * angle) * rate
+        return poses, points + (points - point) @ space.rotation_increment(turn).T
+
     def motion(self, joints: JointSystem, poses: np.ndarray) -> np.ndarray:
         """n by the pose unknowns, in units of ``JointSystem.pose_scale`` and of norm one, (size,)."""
-        (point, axis), z = self.line(poses), np.zeros(joints.size)
-        for body in self.bodies:
-            centre = np.array(joints.bodies[body].centre) + poses[body, : joints.space.dim]
-            turn = joints.space.rotation_rates(poses[body]) @ axis
-            z[joints.columns[body]] = np.concatenate([np.cross(axis, centre - point), turn])
+        z = np.zeros(joints.size)
+        for body, rate in self.rates(joints, poses).items():
+            z[joints.columns[body]] = rate
         z /= joints.pose_scale
         return z / np.linalg.norm(z)
 
+    def is_idle(self, acted_on: Collection[int] = (), forces: Sequence[tuple[int, np.ndarray]] = ()) -> bool:
+        """Whether nothing resists.
 
-def idle_spins(
-    linkage: Linkage, acted_on: Collection[int] = (), forces: Sequence[tuple[int, np.ndarray]] = ()
-) -> tuple[IdleSpin, ...]:
-    """The idle spins of a linkage in space.
+        Args:
+            acted_on: indices of bodies on which, or on whose link, potentials or effects act that turns change; these
+                do not spin idly.
+            forces: on each of some bodies, or its link, a force acts at a place as drawn, (dim,); unless that is the
+                centre of one of the two ball joints the body does not spin idly.
+        """
+        places = np.array([self.system.place(k, body, self.system.drawn) for k, body in self.balls])
+        loaded = [at for body, at in forces if body in self.bodies]
+        off = [np.min(np.linalg.norm(places - at, axis=1)) > _ROUNDING * self.system.length for at in loaded]
+        return not any(off) and set(self.bodies).isdisjoint(acted_on)
 
-    Args:
-        linkage: the bodies and their joints.
-        acted_on: indices of bodies on which, or on whose link, potentials or effects act that turns change; these do
-            not spin idly.
-        forces: on each of some bodies, or its link, a force acts at a place as drawn, (dim,); unless that is the centre
-            of one of the two ball joints the body does not spin idly.
-    """
+
+def spins(linkage: Linkage) -> tuple[Spin, ...]:
+    """The spins of a linkage in space, idle or not."""
     system, found = linkage.rigid, []
     balls = {k: c for k, c in enumerate(system.connections) if system.is_ball(k)}
     pairs = np.array([(c.a, c.b) for k, c in enumerate(system.connections) if k not in balls], dtype=int).reshape(-1, 2)
@@ -92,7 +128,7 @@ def idle_spins(
     _, group = connected_components(graph, directed=False)
     for label in np.unique(group):
         bodies = tuple(int(body) for body in np.flatnonzero(group == label))
-        if any(system.bodies[body].fixed or body in acted_on for body in bodies):
+        if any(system.bodies[body].fixed for body in bodies):
             continue
         held = [(k, c) for k, c in balls.items() if group[c.a] != group[c.b]]
         ends = [(k, body) for k, c in held for body in (c.a, c.b) if group[body] == label]
@@ -102,9 +138,7 @@ def idle_spins(
         places = np.array([system.place(k, body, system.drawn) for k, body in ends])
         from_first = np.linalg.norm(places - places[0], axis=1)
         last = int(np.argmax(from_first))
-        from_last, rounding = np.linalg.norm(places - places[last], axis=1), 1e-9 * linkage.length
-        loaded = [at for body, at in forces if body in bodies]
-        off = [np.min(np.linalg.norm(places[[0, last]] - at, axis=1)) > rounding for at in loaded]
-        if from_first[last] > rounding and np.all(np.minimum(from_first, from_last) <= rounding) and not any(off):
-            found.append(IdleSpin(system, bodies, (ends[0], ends[last])))
+        from_last, rounding = np.linalg.norm(places - places[last], axis=1), _ROUNDING * linkage.length
+        if from_first[last] > rounding and np.all(np.minimum(from_first, from_last) <= rounding):
+            found.append(Spin(system, bodies, (ends[0], ends[last])))
     return tuple(found)

@@ -2,6 +2,7 @@
 
 - ``curve``: load–displacement curves
 - ``mechanism``: mechanisms, deformed and not, side by side
+- ``edge``: stress along edges
 - ``design``: links before and after an optimisation
 - ``shapes``: the content of these pictures
 - ``page``: look, lengths, panels, labels, and PNG files
@@ -9,6 +10,7 @@
 
 from fenicsmech.plot.curve import CurveMark, CurveSeries, CurveTarget, plot_curve
 from fenicsmech.plot.design import IN_PLACE, draw_designs, lay_out_designs
+from fenicsmech.plot.edge import EdgeSeries, plot_edge
 from fenicsmech.plot.mechanism import draw_configurations, lay_out
 from fenicsmech.plot.page import (
     FLEXIBLE,
@@ -29,9 +31,11 @@ from fenicsmech.plot.shapes import (
     MechanismShape,
     OutlineShape,
     Panel,
+    PeakMark,
     Pin,
     RigidShape,
     Trace,
+    outer_faces,
     plan_view,
     rigid_outline,
 )

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import TriMesh
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, PathPatch, Polygon
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.tri import Triangulation
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.plot.page import (
@@ -25,11 +26,15 @@ from fenicsmech.plot.page import (
     FLEXIBLE_RIM,
     HALO,
     HEADING,
+    INK,
     LENGTHS,
     NAME,
     PALETTE,
+    SMALL,
     TITLE,
+    Labels,
     Page,
+    Spot,
     draw_pin,
     house_style,
     legend_width,
@@ -38,7 +43,7 @@ from fenicsmech.plot.page import (
     save_png,
     text_size,
 )
-from fenicsmech.plot.shapes import Arrow, FlexibleShape, MechanismShape, Panel, Reals, RigidShape
+from fenicsmech.plot.shapes import Arrow, FlexibleShape, MechanismShape, Panel, PeakMark, Reals, RigidShape
 from fenicsmech.polygons import edge_loops
 
 _RIGID, _RIGID_RIM = "#c9ccd1", "#6b7078"
@@ -58,8 +63,9 @@ def draw_configurations(
     The undeformed state is a pale outline under the deformed one. Flexible links are orange or coloured by their
     values, rigid links grey, fixed ones dark and hatched; the largest force has the longest arrow.
 
-    Colours span from zero, or the least value, to the 99th percentile: the few peaks at the edge of an interface would
-    leave the rest without contrast. A pointed end of the bar shows that larger values exist.
+    Colours span from zero, or the least value, to the largest of the panels' peaks, which are marked, or else to the
+    99th percentile. A pointed end of the bar shows that larger values exist: near singular places, of which few would
+    leave the rest without contrast.
 
     Args:
         path: the PNG file.
@@ -72,7 +78,8 @@ def draw_configurations(
         raise DescriptionError(f"picture '{path}'", "there is nothing to draw", "Give at least one shape")
     coloured = [shape.values for panel in panels for shape in _filled(panel).flexible if shape.values is not None]
     values = np.concatenate(coloured) if coloured else None
-    norm = None if values is None else _normalise(values)
+    peaks = [panel.peak.value for panel in panels if panel.peak is not None]
+    norm = None if values is None else _normalise(values, max(peaks, default=float(np.percentile(values, 99.0))))
     with house_style():
         legend = _legend(panels)
         layout = lay_out(panels, colour_bar=norm is not None, heading=title, legend=tuple(legend))
@@ -90,8 +97,8 @@ def _filled(panel: Panel) -> MechanismShape:
     return panel.deformed[-1] if panel.deformed else panel.undeformed
 
 
-def _normalise(values: Reals) -> Normalize:
-    low, most = min(0.0, float(values.min())), float(np.percentile(values, 99.0))
+def _normalise(values: Reals, most: float) -> Normalize:
+    low = min(0.0, float(values.min()))
     return Normalize(low, next(high for high in (most, float(values.max()), low + 1.0) if high > low))
 
 
@@ -118,6 +125,8 @@ def _draw_panel(axes: Axes, panel: Panel, layout: Layout, norm: Normalize | None
         axes.plot(*trace.marks.T, "o", ms=4.5, mfc=colour, mec="white", mew=0.8, zorder=7)
     for arrow in panel.arrows:
         _draw_arrow(axes, arrow, layout.arrow_scale)
+    if panel.peak is not None:
+        _draw_peak(axes, panel.peak, state)
     axes.grid(True, color="#ededed")  # last: coloured meshes switch it off
 
 
@@ -141,8 +150,10 @@ def _draw_flexible(axes: Axes, shape: FlexibleShape, norm: Normalize | None) -> 
     face = FLEXIBLE
     if shape.values is not None:
         face, corners = "none", shape.points[shape.triangles]
-        look = {"cmap": _STRESS, "norm": norm, "ec": "face", "lw": 0.3, "zorder": 4}
-        axes.add_collection(PolyCollection(corners, array=shape.values, **look), autolim=False)
+        look = {"cmap": _STRESS, "norm": norm, "zorder": 4}
+        # each triangle with corners of its own, where values jump between cells
+        apart = Triangulation(*corners.reshape(-1, 2).T, np.arange(corners.size // 2).reshape(-1, 3))
+        axes.add_collection(TriMesh(apart, array=shape.values.ravel(), **look), autolim=False)
     axes.add_patch(PathPatch(_rim(shape), fc=face, ec=FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
 
 
@@ -160,6 +171,17 @@ def _draw_arrow(axes: Axes, arrow: Arrow, scale: float) -> None:
             va="top" if side[1] < -0.5 else "bottom" if side[1] > 0.5 else "center",
             path_effects=HALO, zorder=9,
         )  # fmt: skip
+
+
+def _draw_peak(axes: Axes, peak: PeakMark, state: MechanismShape) -> None:
+    """A ring at the peak, and its label beside it, off the links where there is room."""
+    axes.plot(*peak.at, "o", ms=7.0, mfc="none", mec="white", mew=3.0, zorder=9)
+    axes.plot(*peak.at, "o", ms=7.0, mfc="none", mec=INK, mew=1.4, zorder=9)
+    outlines = [rigid.outline for rigid in state.rigid]
+    outlines += [polygon for flexible in state.flexible for polygon in _rim(flexible).to_polygons()]
+    angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    spots = [Spot(peak.at, np.array([np.cos(angle), np.sin(angle)])) for angle in angles]
+    Labels(axes, outlines).add(peak.label, spots, leader=True, **SMALL)
 
 
 def _draw_colour_bar(layout: Layout, norm: Normalize, values: np.ndarray, label: str) -> None:

@@ -36,7 +36,7 @@ class FlexibleShape:
     Args:
         points: (n, 2) vertices, deformed or not; vertices of no triangle are allowed.
         triangles: (m, 3) indices of vertices.
-        values: (m,) one per triangle, or None.
+        values: (m, 3) at the corners of each triangle, or None.
         name: of the link, for messages.
     """
 
@@ -53,7 +53,8 @@ class FlexibleShape:
             raise DescriptionError(part, "it has no triangle", "Give the triangles of its mesh or of its plan view")
         set_fields(self, points=points, triangles=triangles)
         if self.values is not None:
-            set_fields(self, values=real_array(f"values of {part}, one per triangle,", self.values, len(triangles)))
+            values = real_array(f"values at the corners of triangles of {part}", self.values, len(triangles), 3)
+            set_fields(self, values=values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +106,18 @@ class Trace:
             set_fields(self, **{name: real_array(f"{name} of trace '{self.label}'", getattr(self, name), None, 2)})
 
 
+@dataclass(frozen=True, eq=False)
+class PeakMark:
+    """The largest value of a panel, at the point ``at`` (2,); ``label`` stands beside it."""
+
+    at: Reals
+    value: float
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        set_fields(self, at=real_array(f"position of peak '{self.label}'", self.at, 2))
+
+
 @dataclass(frozen=True)
 class MechanismShape:
     """All links and pins of a mechanism in one state."""
@@ -124,6 +137,7 @@ class Panel:
         arrows: the forces on the last state.
         traces: paths of points.
         title: a line above the panel.
+        peak: the largest of the values that colour links, singular places left out.
     """
 
     undeformed: MechanismShape
@@ -131,6 +145,7 @@ class Panel:
     arrows: tuple[Arrow, ...] = ()
     traces: tuple[Trace, ...] = ()
     title: str = ""
+    peak: PeakMark | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +214,32 @@ def rigid_outline(points: ArrayLike, width: float) -> Reals:
     return discs[ConvexHull(discs).vertices]
 
 
+def outer_faces(points: ArrayLike, tets: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The boundary faces of a solid mesh.
+
+    Args:
+        points: (n, 3) vertices.
+        tets: (m, 4) indices of vertices, in any orientation.
+
+    Returns:
+        (k, 3) vertices of the triangles, counter-clockwise seen from outside; (k,) the tetrahedron each belongs to.
+    """
+    vertices = real_array("points of a solid mesh", points, None, 3)
+    cells = index_array("tetrahedra of a solid mesh", tets, None, 4, below=len(vertices))
+    faces = cells[:, ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))].reshape(-1, 3)  # face i is opposite to vertex i
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    boundary = first[count == 1]
+    faces, opposite, owner = faces[boundary], cells.reshape(-1)[boundary], boundary // 4
+    inward = np.einsum("ij,ij->i", _normals(vertices, faces), vertices[faces[:, 0]] - vertices[opposite]) < 0.0
+    return np.where(inward[:, None], faces[:, [0, 2, 1]], faces), owner
+
+
+def _normals(vertices: Reals, faces: NDArray[np.int64]) -> Reals:
+    """Of triangles, twice as long as their area, (k, 3)."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
 def plan_view(points: ArrayLike, tets: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The boundary faces whose outer unit normal has z > 0.5.
 
@@ -211,18 +252,8 @@ def plan_view(points: ArrayLike, tets: ArrayLike) -> tuple[NDArray[np.int64], ND
     Returns:
         (k, 3) vertices of the triangles, counter-clockwise seen from +z; (k,) the tetrahedron each belongs to.
     """
-    vertices = real_array("points of a solid mesh", points, None, 3)
-    cells = index_array("tetrahedra of a solid mesh", tets, None, 4, below=len(vertices))
-    faces = cells[:, ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))].reshape(-1, 3)  # face i is opposite to vertex i
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    boundary = first[count == 1]
-    faces, opposite, owner = faces[boundary], cells.reshape(-1)[boundary], boundary // 4
-
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    inward = np.einsum("ij,ij->i", normal, a - vertices[opposite]) < 0.0
-    normal[inward] *= -1.0
-    faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
+    faces, owner = outer_faces(points, tets)
+    normal = _normals(np.asarray(points, dtype=float), faces)
     top = normal[:, 2] > 0.5 * np.linalg.norm(normal, axis=1)
     if not top.any():
         part, problem = "plan view of a solid mesh", "no face has a normal towards +z"

@@ -1,6 +1,6 @@
-"""Numbers of flexible links: numbers of their law, and their depth.
+"""Numbers of flexible links: numbers of their law, their depth, and changes of their temperature.
 
-Both are fields with one value per cell in the energy E, whose derivative with respect to the value on one link is a
+All are fields with one value per cell in the energy E, whose derivative with respect to the value on one link is a
 form,
 
     xᵀ ∂F/∂p = ∂(r · û)/∂p,     r = ∂E/∂u,     û = ∂u/∂y · x.
@@ -8,6 +8,8 @@ form,
 In space the depth b is part of the rest shape: links are stretched along z from the middle of their depth,
 
     d_z = (b / b₀ − 1) (Z − Z_m).
+
+The field of the temperature is the excess length α ΔT.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from itertools import compress
 import numpy as np
 
 from fenicsmech.compat import cell_dofs
+from fenicsmech.effects import Temperature
 from fenicsmech.errors import DescriptionError, expect, finite, set_fields
 from fenicsmech.mechanism import FlexibleLink, Material, Scene, Units
 from fenicsmech.model import MechanismModel
@@ -77,7 +80,7 @@ class LawParameter(_OfLinks):
     """A number of the law of flexible links: ``LawParameter("E", finger)``.
 
     Args:
-        parameter: its name, as in ``law.parameters``.
+        parameter: its name, as in ``law.constants``.
         parts: a flexible link, or several that share it.
 
     Raises:
@@ -115,12 +118,14 @@ class LawParameter(_OfLinks):
         return self._of(part.material)
 
     def _of(self, material: Material) -> float:
-        known = material.law.parameters
-        if self.parameter not in known:
-            raise DescriptionError(
-                self.name, f"the law of {material.name!r} has no such number", f"It has {', '.join(known)}"
-            )
-        return known[self.parameter]
+        law, known = material.law, material.law.constants
+        if self.parameter in known:
+            return known[self.parameter]
+        problem, remedy = f"the law of {material.name!r} has no such number", f"It has {', '.join(known)}"
+        if self.parameter in law.parameters:
+            problem = f"it is a coordinate of a direction of the law of {material.name!r}, which has unit length"
+            remedy = f"Turn the direction by simulation.with_material(…); the numbers of the law are {', '.join(known)}"
+        raise DescriptionError(self.name, problem, remedy)
 
     def check_value(self, value):
         value = finite(self.name, value)
@@ -129,12 +134,71 @@ class LawParameter(_OfLinks):
             replace(law.with_parameters({**law.parameters, self.parameter: value}))  # runs its checks
 
     def unit(self, units: Units) -> str:
-        return units.stress if self.parameter == "E" else ""
+        return units.stress if self.parts[0].material.law.is_modulus(self.parameter) else ""
 
     def on(self, model):
         chosen = self.chosen(model)
         drawn = self.shared(map(self._of, compress(model.materials, chosen)))
         return _LawParameter(model, self.parameter, chosen, drawn)
+
+
+@dataclass(frozen=True, init=False)
+class TemperatureChange(NumberKind):
+    """The change of temperature of flexible links: ``TemperatureChange(warm)``; K.
+
+    Args:
+        parts: a ``Temperature`` of the scene, or several that share the change.
+
+    Raises:
+        DescriptionError: there are none, or one is given twice.
+    """
+
+    what = "change of temperature"
+    parts: tuple[Temperature, ...]
+
+    @staticmethod
+    def candidates(scene: Scene) -> Sequence[Temperature]:
+        return [effect for effect in scene.effects if isinstance(effect, Temperature)]
+
+    @staticmethod
+    def label(part):
+        if not isinstance(part, Temperature):
+            return repr(part)
+        return "all links" if part.links is None else ", ".join(link.name for link in part.links)
+
+    def described(self, part):
+        return self.shared(part.change if isinstance(part.change, tuple) else [part.change])
+
+    def unit(self, units):
+        return "K"
+
+    def check_value(self, value):
+        value = finite(self.name, value)
+        # those of effects on all links are not known without a mechanism
+        for link in (link for effect in self.parts for link in effect.changes(())):
+            Temperature.check_change(link, value)
+
+    def on(self, model):
+        return _TemperatureChange(model, self.parts, self.described(self.parts[0]))
+
+
+class _TemperatureChange(ModelNumber):
+    """The change of temperature of the links of some effects."""
+
+    def __init__(self, model: MechanismModel, effects: Sequence[Temperature], drawn: float) -> None:
+        self._growth, links = model.elastic.growth, model.mechanism.flexible_links
+        warm = {link for effect in effects for link in effect.changes(links)}
+        self._expansions = {k: link.material.expansion for k, link in enumerate(links) if link in warm}
+        self.drawn = self.value = drawn
+
+    def set(self, value):
+        self.value = value
+        for link, expansion in self._expansions.items():
+            self._growth.stretch(Temperature.__name__, link, expansion * value)
+
+    def slope(self, terms):
+        by_link = terms.by_link(Temperature.__name__)
+        return float(sum(expansion * by_link[link] for link, expansion in self._expansions.items()))
 
 
 class _LawParameter(ModelNumber):

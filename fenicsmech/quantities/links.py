@@ -27,8 +27,8 @@ _CHORDS = 48  # of a centreline: their length is in error by 1e-4 at most, and i
 
 
 @dataclass(frozen=True)
-class _OfLinks(Quantity):
-    """A sum over flexible links; all of them by default."""
+class OfLinks(Quantity):
+    """A number of flexible links together; of all of them by default."""
 
     links: FlexibleLink | Sequence[FlexibleLink] | None = None
     what: ClassVar[str]
@@ -48,14 +48,15 @@ class _OfLinks(Quantity):
     def weights(self, model: MechanismModel) -> np.ndarray:
         """One for the links that count, else zero, (links,)."""
         everyone = model.mechanism.flexible_links
-        return np.array([float(link in self._chosen(everyone)) for link in everyone])
+        return np.array([float(link in self.chosen(everyone)) for link in everyone])
 
-    def _chosen(self, everyone: Sequence[FlexibleLink]) -> Sequence[FlexibleLink]:
+    def chosen(self, everyone: Sequence[FlexibleLink]) -> Sequence[FlexibleLink]:
+        """Those of ``everyone`` that count."""
         return everyone if self.links is None else self.links  # type: ignore[return-value]  # a tuple by now
 
 
 @dataclass(frozen=True)
-class StrainEnergy(_OfLinks):
+class StrainEnergy(OfLinks):
     """The elastic energy of flexible links.
 
     Attributes:
@@ -78,7 +79,7 @@ class StrainEnergy(_OfLinks):
 
 
 @dataclass(frozen=True)
-class LinkVolume(_OfLinks):
+class LinkVolume(OfLinks):
     """The volume of flexible links at rest.
 
     Attributes:
@@ -124,7 +125,7 @@ class LinkMass(LinkVolume):
 
     def check(self, scene, dim):
         super().check(scene, dim)
-        for link in self._chosen(scene.mechanism.flexible_links):
+        for link in self.chosen(scene.mechanism.flexible_links):
             if self.density is None and link.material.density is None:
                 raise DescriptionError(
                     self.name,

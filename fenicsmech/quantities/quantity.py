@@ -100,6 +100,10 @@ class Observable(ABC):
     def partials(self, system: EquilibriumSystem, state: State) -> list[Partial]:
         """The derivatives of each component at a state of ``system``."""
 
+    def smoothing_errors(self, state: State | None) -> np.ndarray:
+        """What the true extreme adds to each value where that is a smooth one in its place, (size,); 0 by default."""
+        return np.zeros(self.size)
+
 
 class RestObservable(Observable):
     """A quantity of the links at rest on one model; it has one component."""
@@ -126,10 +130,14 @@ class Quantity(ABC):
     Attributes:
         of_state: whether it depends on an equilibrium; those that do not need no sample.
         from_unloaded: whether it counts from the unloaded configuration.
+        smoothed: whether its observable has smooth values in place of those of an extreme, and knows the difference.
+        resolution: relative change of an extreme that is within the accuracy to which it is known.
     """
 
     of_state: ClassVar[bool] = True
     from_unloaded: ClassVar[bool] = False
+    smoothed: ClassVar[bool] = False
+    resolution: ClassVar[float] = 0.0
 
     @property
     @abstractmethod

@@ -13,7 +13,7 @@ from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
 from fenicsmech.elasticity import PLANE_STRESS, SPATIAL, ElasticModel
 from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, PointLoad, State, Unknown
-from fenicsmech.errors import DescriptionError, EquilibriumError, counted
+from fenicsmech.errors import DescriptionError, EquilibriumError, counted, real_array
 from fenicsmech.estimates import (
     AccuracyOptions,
     DoubtOptions,
@@ -26,13 +26,24 @@ from fenicsmech.estimates import (
 )
 from fenicsmech.files import write_csv
 from fenicsmech.log import logger
-from fenicsmech.mechanism import DRAWN, Configuration, Force, ForceGroup, Joint, Output, PrescribedPart, Units
+from fenicsmech.mechanism import (
+    DRAWN,
+    Configuration,
+    FlexibleLink,
+    Force,
+    ForceGroup,
+    Joint,
+    Output,
+    PrescribedPart,
+    Units,
+)
 from fenicsmech.multibody import Freedom
 from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.fields import MechanismPlotter, gather, position, write_xdmf
+from fenicsmech.simulation.fields import MechanismPlotter, gather, peak_mark, position, write_xdmf
 from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.omitted_effects import Explanation, ExplanationOptions, PinFriction, explain, friction_band
+from fenicsmech.stress import EdgeStress, LinkSurface, StressField, allowables, von_mises
 
 _log = logger(__name__)
 
@@ -171,7 +182,8 @@ class Curve:
         """Estimated errors of plane stress, (frames,), to be added; arguments as those of ``error_estimates``.
 
         They include contraction that interfaces prevent, and wide thin links that curl across their depth as they bend,
-        but not motion out of the plane.
+        but not motion out of the plane. Of laws with directions they take typical isotropic constants: compare links
+        of such laws in 3D.
 
         Raises:
             DescriptionError: motors move along the curve, or it is not in plane stress.
@@ -322,17 +334,48 @@ class Curve:
 
     # -- pictures and files --------------------------------------------------------------------------------------
 
-    def von_mises(self, frame: Frame | None = None) -> np.ndarray | None:
-        """Von Mises stress at the midpoints of all cells, on rank 0; None elsewhere.
+    def stress_field(self, frame: Frame | None = None) -> StressField | None:
+        """Recovered stress and strain at the vertices of the mesh, on rank 0; None elsewhere.
 
         Args:
             frame: one of the curve's; the last one by default.
 
         Returns:
-            (cells,), numbered as in ``model.mesh.cells``.
+            numbered as ``model.mesh.vertices``.
         """
-        snapshot = gather(self.discretisation.model, self._chosen(frame))
-        return None if snapshot is None else snapshot.von_mises
+        chosen = self._chosen(frame)
+        return chosen.stresses.field(chosen.state, chosen.design)
+
+    def edge_stress(
+        self,
+        link: FlexibleLink,
+        *,
+        start: Sequence[float] | None = None,
+        end: Sequence[float] | None = None,
+        frame: Frame | None = None,
+    ) -> EdgeStress:
+        """The recovered stress along the outline of a flexible link, at mid-depth in space, for plots and as data.
+
+        Args:
+            link: the link.
+            start: drawn point, (2,), from whose nearest point of the outline arc lengths count; by default the leftmost
+                one of the outer outline. The outline of a hole is that of a point near it.
+            end: drawn point to which the edge goes, the shorter way; by default all around, the link on the left.
+            frame: one of the curve's; the last one by default.
+
+        Raises:
+            DescriptionError: the frame is of another curve, the link is not a flexible link of the mechanism, or the
+                points lie on different outlines.
+        """
+        chosen = self._chosen(frame)
+        if link not in self.discretisation.scene.mechanism.flexible_links:
+            raise DescriptionError(
+                f"edge of {link!r}", "it is not a flexible link of the mechanism", "Give one of its flexible links"
+            )
+        given = [None if point is None else real_array("point of an edge", point, 2) for point in (start, end)]
+        if start is None and end is not None:
+            raise DescriptionError(f"edge of {link.name!r}", "it has an end, but no start", "Give start=… too")
+        return chosen.stresses.edge(chosen.state, chosen.design, link.name, self.units, *given)
 
     def series(self, label: str = "", *, colour: str | None = None, faint: bool = False) -> CurveSeries:
         """The curve as a plot draws it, arguments as those of ``CurveSeries``."""
@@ -352,7 +395,7 @@ class Curve:
 
         Args:
             path: the file.
-            stress: colour links by von Mises stress.
+            stress: colour links by recovered von Mises stress, and mark its peak.
             traces: paths of points to draw along.
             beside: curves of other configurations to draw beside this one.
         """
@@ -371,25 +414,42 @@ class Curve:
         places = [position(model, force, end)[:2] for force, _ in forces]
         # an optimised design in the drawn configuration is not the drawn design
         name = "" if self.configuration == DRAWN else f"{self.configuration.name}: "
+        plotter = on_one(self.discretisation.comm, lambda: MechanismPlotter(model))
+        peak, safety, found = None, None, None
+        if stress:
+
+            def seen(_: LinkSurface) -> tuple[np.ndarray, np.ndarray]:
+                assert plotter is not None and last is not None  # on rank 0
+                return plotter.places(last)
+
+            safety = end.safety if allowables(end.stresses.materials) else None
+            peak, found = end.peak, end.stresses.at(end.state, end.design, seen)
 
         def draw() -> Panel:
-            assert first is not None and last is not None  # on rank 0
-            plotter, arrows = MechanismPlotter(model), []
+            assert plotter is not None and first is not None and last is not None  # on rank 0
+            arrows = []
             for (force, ratio), place in zip(forces, places, strict=True):
                 size = ratio * end.force
                 arrows.append(Arrow(place, size * np.array(force.direction[:2]), label=f"{size:g} {up.unit}"))
+            values, mark = None if found is None else von_mises(found.stress), None
+            if peak is not None and peak.value > 0.0:
+                mark = peak_mark(last, end.stresses, peak, safety, self.units.stress)
             return Panel(
-                plotter.shape(first, stress=False),
-                (plotter.shape(last, stress=stress),),
+                plotter.shape(first),
+                (plotter.shape(last, values),),
                 tuple(arrows),
                 tuple(traces),
                 f"{name}{up(end.force)}, {across(end.displacement)}",
+                mark,
             )
 
         return on_one(self.discretisation.comm, draw)
 
     def write(self, path: str | Path) -> None:
-        """Writes displacement, stress and pressure fields of all frames as XDMF for ParaView.
+        """Writes displacement, recovered stress and strain, and pressure fields of all frames as XDMF for ParaView.
+
+        All are at vertices: stress of Cauchy, its von Mises stress, the nominal strain of the elastic deformation, in
+        the plane of planar models, and its largest principal value. They vanish where joints hold a link.
 
         Raises:
             DescriptionError: the path does not end in .xdmf.
@@ -398,7 +458,7 @@ class Curve:
         write_xdmf(path, self.discretisation.model, self.frames)
 
     def write_csv(self, path: str | Path, *, errors: bool = False) -> None:
-        """Writes displacement, force, stability, energy and stress of every frame, one row each.
+        """Writes displacement, force, stability, energy, largest stress and its error of every frame, one row each.
 
         Args:
             path: the file.
@@ -413,6 +473,7 @@ class Curve:
             "snapped_through": self.snapped_through,
             f"strain energy [{force} {length}]": np.array([frame.strain_energy for frame in self.frames]),
             f"max von Mises [{stress}]": np.array([frame.max_stress for frame in self.frames]),
+            f"error of max von Mises [{stress}]": np.array([frame.peak.error for frame in self.frames]),
         }
         if errors:
             name, unit = self.unknown.value, force if self.unknown is Unknown.FORCE else length

@@ -28,6 +28,7 @@ from fenicsmech.mechanism import (
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
 from fenicsmech.multibody import JointChange, PlacedPoint, build_linkage
+from fenicsmech.stress import StressOptions, StressRecovery
 
 
 class Discretisation:
@@ -55,9 +56,10 @@ class Discretisation:
         shapes: Mapping[FlexibleLink, Shape] | None = None,
         moved: Mapping[Joint, JointChange] | None = None,
         placed: Mapping[MaterialPoint, PlacedPoint] | None = None,
+        stress: StressOptions | None = None,
     ) -> None:
         self.scene, self.fidelity, self.clock, self.comm = scene, fidelity, clock, comm
-        self.method, self.predictor = method, predictor
+        self.method, self.predictor, self._stress = method, predictor, stress
         self.moved, self.placed = dict(moved or {}), dict(placed or {})
         self.linkage = build_linkage(scene.mechanism, fidelity.model.mechanism_dim, self.moved)
         links = scene.mechanism.flexible_links
@@ -80,7 +82,9 @@ class Discretisation:
         other places, nothing meshed yet."""
         shapes, moved = self.shapes | dict(shapes or {}), self.moved | dict(moved or {})
         placed = self.placed | dict(placed or {})
-        other = Discretisation(self.scene, fidelity, self.method, self.predictor, clock, comm, shapes, moved, placed)
+        other = Discretisation(
+            self.scene, fidelity, self.method, self.predictor, clock, comm, shapes, moved, placed, self._stress
+        )
         other.materials = self.materials
         return other
 
@@ -104,7 +108,7 @@ class Discretisation:
         changed.linkage = build_linkage(self.scene.mechanism, self.fidelity.model.mechanism_dim, self.moved)
         changed.materials = tuple(other if material == drawn else material for material in self.materials)
         changed.mesh, changed._solvers = self.mesh, {}
-        for name in ("model", "estimates"):
+        for name in ("model", "estimates", "stresses"):
             changed.__dict__.pop(name, None)
         return changed
 
@@ -136,6 +140,11 @@ class Discretisation:
     def estimates(self) -> Estimates:
         """Error estimates at equilibria."""
         return Estimates(self.model)
+
+    @cached_property
+    def stresses(self) -> StressRecovery:
+        """Recovered stresses at equilibria."""
+        return StressRecovery(self.model, self._stress)
 
     def solver(self, part: PrescribedPart, others: Sequence[Force] = ()) -> EquilibriumSolver:
         """The solver for a force or motors that change and some constant forces.

@@ -345,12 +345,17 @@ class CurveFollower:
 
     def _finishes(self, path: ArcLengthStepper) -> list[Finish]:
         """Displacements or positions first, then forces."""
-        followed = path.value, path.value_rate
-        conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate_rate)
+        origin, opposite = self._stepper.origin, self._followed.opposite
+        followed = path.value, path.value_rate, self._followed.at
+
+        def prescribed(end: float) -> DisplacementControl | None:
+            return opposite.at(end + origin) if opposite else None
+
+        conjugate = (lambda point: self._conjugate(point.state)), (lambda point: point.conjugate_rate), prescribed
         displacement, force = (followed, conjugate) if self._followed.displaces else (conjugate, followed)
         return [
-            Finish(value, rate, end, max(map(abs, ends)) or 1.0)
-            for (value, rate), ends in ((displacement, self._until.displacements), (force, self._until.forces))
+            Finish(value, rate, end, max(map(abs, ends)) or 1.0, control(end))
+            for (value, rate, control), ends in ((displacement, self._until.displacements), (force, self._until.forces))
             for end in ends
         ]
 

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fenicsmech.equilibrium import Reaction, State, Step
+from fenicsmech.errors import DescriptionError, expect
 from fenicsmech.mechanism import Motor, Output
 from fenicsmech.model import Design, MechanismModel
+from fenicsmech.stress import (
+    LawStability,
+    Life,
+    Safety,
+    StressPeak,
+    StressRecovery,
+    SurfacePeaks,
+    check_allowables,
+    life_between,
+    safety_of,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +38,6 @@ class Frame:
         unstable_modes: directions in which the energy has a maximum, under dead loads.
         stable_under_control: whether it is stable while its control is held.
         strain_energy: elastic energy of all links.
-        max_stress: largest von Mises stress at cell midpoints.
         outputs: displacement of each output of the mechanism, from the unloaded configuration.
         reactions: force and moment of each joint on its second link, by joint name.
         motors: torque or force of each motor.
@@ -35,6 +47,7 @@ class Frame:
         phases: wall-clock time by phase.
         state: the equilibrium itself.
         design: that it belongs to.
+        stresses: of the model, from which ``peak`` is recovered when it is first read.
     """
 
     force: float
@@ -43,7 +56,6 @@ class Frame:
     unstable_modes: int
     stable_under_control: bool
     strain_energy: float
-    max_stress: float
     outputs: Mapping[Output, float]
     reactions: Mapping[str, Reaction]
     motors: Mapping[Motor, float]
@@ -53,6 +65,65 @@ class Frame:
     phases: Mapping[str, float]
     state: State
     design: Design
+    stresses: StressRecovery
+
+    @property
+    def peak(self) -> StressPeak:
+        """The largest von Mises stress at the surface of flexible links, places left out where it has no limit.
+
+        The first read of it, or of what follows from it, is collective.
+        """
+        return self._peaks.whole
+
+    @property
+    def peaks(self) -> Mapping[str, StressPeak]:
+        """The peak of each flexible link, by its name; one evaluation serves all of them."""
+        return {peak.link: peak for peak in self._peaks.links}
+
+    @cached_property
+    def _peaks(self) -> SurfacePeaks:
+        return self.stresses.peaks(self.state, self.design)
+
+    @property
+    def safety(self) -> Safety:
+        """The factor of safety: least over the links of allowable over peak, each with the strength of its material.
+
+        Raises:
+            DescriptionError: no material has an allowable stress or strain.
+        """
+        check_allowables(self.stresses.materials)
+        return safety_of(self._peaks, self.stresses.materials)
+
+    @cached_property
+    def law_stability(self) -> Mapping[str, LawStability]:
+        """Drucker's stability of the law of each flexible link where it is least, by the link's name: 1 at rest.
+
+        Not above zero the law is used beyond the strains it describes. The first read is collective.
+        """
+        return {own.link: own for own in self.stresses.law_stabilities(self.state, self.design)}
+
+    def life(self, other: Frame, *, links: Sequence[str] | None = None) -> Life:
+        """Cycles to failure between this frame and another one, by Basquin with Goodman's mean stress.
+
+        Args:
+            other: of the same simulation and design, on any of its curves.
+            links: names of the flexible links that count; all by default.
+
+        Raises:
+            DescriptionError: the frames are of different simulations or designs, or a material lacks the ultimate
+                stress, or the line of Basquin where the stress is above its endurance limit.
+        """
+        expect("life", other, Frame, "a frame", "Give a frame of a curve of the same simulation")
+        if other.stresses is not self.stresses:
+            problem = "the frames belong to different simulations"
+            raise DescriptionError("life", problem, "Take both from curves of one simulation")
+        chosen = None if links is None else tuple(links)
+        return life_between(self.stresses, (self.state, self.design), (other.state, other.design), chosen)
+
+    @property
+    def max_stress(self) -> float:
+        """The value of ``peak``, whose first read is collective."""
+        return self.peak.value
 
     @property
     def stable(self) -> bool:
@@ -63,7 +134,7 @@ class Frame:
         figures = [f"force {self.force:.6g}", f"displacement {self.displacement:.6g}"]
         named: list[tuple[Output | Motor, float]] = [*self.outputs.items(), *self.motors.items()]
         figures += [f"{part.name} {value:.6g}" for part, value in named]
-        figures += [f"strain energy {self.strain_energy:.4g}", f"stress {self.max_stress:.4g}"]
+        figures.append(f"strain energy {self.strain_energy:.4g}")
         figures.append("stable" if self.stable else f"{self.unstable_modes} unstable modes")
         figures += ["snapped through"] * self.snapped_through
         return f"<Frame: {', '.join(figures)}>"

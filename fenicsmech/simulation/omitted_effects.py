@@ -38,6 +38,7 @@ from fenicsmech.multibody import JointCoordinate
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.fields import gather
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.stress import allowables
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,7 @@ def explain(
         hints.append(_weight_hint(change, frame.displacement, units, options))
     hints += [_length_hint(discretisation, units, options), _spin_hint(model, solver, at)]
     hints += [_compressibility_hint(model, options.locking[model.elastic.order]), _touching_hint(model, frame)]
+    hints += [_strength_hint(frame), _law_hint(frame)]
     if model.linkage.dim == 2:
         with model.shaped(at.design):
             hints.append(_buckling_hint(model, frame, options.slender))
@@ -157,6 +159,22 @@ def _weight_hint(change: float | None, displacement: float, units: Units, option
         "list Gravity(…) to include it (one form to compile, a few per cent of a frame)",
         part > options.tolerance,
     )
+
+
+def _strength_hint(frame: Frame) -> Hint | None:
+    """The factor of safety; None, and nothing computed, where no material has an allowable."""
+    if not allowables(frame.stresses.materials):
+        return None
+    safety = frame.safety
+    return Hint("yield and fracture", str(safety), safety.factor - safety.error < 1.0)
+
+
+def _law_hint(frame: Frame) -> Hint | None:
+    """The least stable law; None, and nothing computed, where all are known to be stable."""
+    if all(material.law.stable for material in frame.stresses.materials.values()):
+        return None
+    least = min(frame.law_stability.values(), key=lambda own: own.value)
+    return Hint("instability of the material", str(least), not least.stable)
 
 
 def _point_force_hint(

@@ -133,6 +133,19 @@ class RestPoses:
         self._last = control.constrained, wanted, rest
         return rest
 
+    def balanced(self) -> State | None:
+        """The pose in which constant loads balance with springs that are not far stronger; None without springs,
+        or if that is the pose as drawn, or none is found."""
+        if not self._model.spring_potentials:
+            return None
+        model, rigid, unloaded = self._model, self._model.linkage.rigid, self._unloaded
+        levels = ((), (*model.spring_potentials, *self._constant))
+        turn = from_one(model.mesh.mesh.comm, lambda: self._search.pose(rigid, unloaded.poses, self._motors, levels))
+        still = np.array_equal(turn.way[-1], unloaded.poses)
+        if still or turn.ending is not RestEnding.AT_REST or any(True for _ in self._met_on(turn.way)):
+            return None
+        return self._at(turn.way[-1])
+
     def same(self, a: RestPose, b: RestPose) -> bool:
         """Whether steps under load that start from one may start from the other as well."""
         if a.reached or b.reached or a.loads_resist != b.loads_resist:

@@ -15,7 +15,7 @@ from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, HermitePredictor, Predictor
 from fenicsmech.elasticity import Formulation, MixedFormulation, Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, PrimalDualNewton, State
-from fenicsmech.errors import AssemblyError, DescriptionError, expect
+from fenicsmech.errors import AssemblyError, DescriptionError, expect, positive
 from fenicsmech.estimates import AccuracyControl, Choice, Estimates, FidelityLevel, LevelErrors, cause_of_growth
 from fenicsmech.log import Clock, Progress, logger
 from fenicsmech.mechanism import (
@@ -44,7 +44,9 @@ from fenicsmech.simulation.fields import rest_vertices
 from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent, Until, branches, read_path
 from fenicsmech.simulation.frame import ModeShape
 from fenicsmech.simulation.omitted_effects import coarse_links
-from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, read_request
+from fenicsmech.simulation.safe_range import SafeRange, SafeRangeOptions, SafeRangeSearch, read_bounds
+from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, check_force, read_others, read_request
+from fenicsmech.stress import SingularPlace, StressOptions, check_allowables
 
 _log = logger(__name__)
 
@@ -82,6 +84,7 @@ class Simulation:
             ``DisplacementFormulation()``: in none.
         solver: method for equilibria.
         predictor: of the next equilibrium on a curve.
+        stress: numbers of the recovery of stresses and of singular places.
         comm: processes that share the work.
 
     Attributes:
@@ -105,6 +108,7 @@ class Simulation:
         formulation: Formulation | None = None,
         solver: EquilibriumMethod | None = None,
         predictor: Predictor | None = None,
+        stress: StressOptions | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
         expect("simulation", scene, Scene, "a scene", "Give Scene(mechanism, effects=[…])")
@@ -113,6 +117,7 @@ class Simulation:
             ("quadrature", quadrature, Quadrature, "Quadrature(degree)"),
             ("solver", solver, EquilibriumMethod, "PrimalDualNewton(…)"),
             ("predictor", predictor, Predictor, "HermitePredictor(), TangentPredictor() or ConstantPredictor()"),
+            ("stress", stress, StressOptions, "StressOptions(…)"),
         ):
             if value is not None:
                 expect(name, value, kind, f"a {name}", f"Give {remedy}")
@@ -135,7 +140,7 @@ class Simulation:
             self._control = AccuracyControl(scene, accuracy, size, formulation, comm=comm)
             fidelity = self._control.fidelity(self._control.level)
         solver, predictor = solver or PrimalDualNewton(), predictor or HermitePredictor()
-        self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm)
+        self._discretisation = Discretisation(scene, fidelity, solver, predictor, self.clock, comm, stress=stress)
         if accuracy is None:
             self._warn_of_coarse_links()
         self._described = _description(scene.mechanism)
@@ -263,6 +268,50 @@ class Simulation:
                 "Call branches() on the simulation that computed it, before it changes to a finer mesh",
             )
         return branches(curve, event, until, steps or ArcSteps(), mode)
+
+    def safe_range(
+        self,
+        part: Force | ForceGroup,
+        *,
+        forces: Sequence[float] | None = None,
+        displacements: Sequence[float] | None = None,
+        factor: float = 1.0,
+        configuration: Configuration = DRAWN,
+        others: Mapping[Force, float] | None = None,
+        options: SafeRangeOptions | None = None,
+    ) -> SafeRange:
+        """The forces and displacements between which every link bears its stress, in both senses of the force.
+
+        In each sense the force grows from zero until the first link reaches its allowable (``Frame.safety``), or the
+        mechanism would snap or buckle. Links of unknown strength do not count; the result names them.
+
+        Args:
+            part: the force that changes, or a ``ForceGroup`` of several.
+            forces: ends of the range that is searched, one on each side of zero; without ends by default. Or
+            displacements: such ends; displacements are prescribed then, past limit points of the force.
+            factor: of safety, required.
+            configuration: motor positions.
+            others: constant magnitudes of other forces.
+            options: of the search.
+
+        Raises:
+            DescriptionError: the request contradicts itself or the mechanism, no material has an allowable, or no
+                fidelity was chosen for an accuracy yet.
+            AssemblyError: the configuration does not assemble.
+            EquilibriumError: the mechanism has no equilibrium near rest, nothing resists, or no end is found.
+        """
+        self._check_description()
+        self._check_chosen(f"safe range of {part!r}")
+        check_force(self.scene.mechanism, part)
+        constant, factor = read_others(self.scene.mechanism, part, configuration, others), positive("factor", factor)
+        low, high = read_bounds(part, forces, displacements)
+        check_allowables(self._discretisation.stresses.materials)
+        request, options = CurveRequest(part, (), configuration, constant), options or SafeRangeOptions()
+        displaces, units = displacements is not None, self.scene.units
+        with self._shaped():
+            search = SafeRangeSearch(self._discretisation, request, displaces=displaces, factor=factor, options=options)
+            lower, upper = (search.end(bound) for bound in (low, high))
+        return SafeRange(part, factor, lower, upper, (units.force, units.length))
 
     def path(self, part: Force | Output, configurations: Sequence[Configuration]) -> np.ndarray:
         """Position of the point of a force or output in each rigid assembly, (configurations, dim).
@@ -430,6 +479,11 @@ class Simulation:
     def estimates(self) -> Estimates:
         """Error estimates at equilibria of the present fidelity."""
         return self._discretisation.estimates
+
+    @property
+    def singular_places(self) -> tuple[SingularPlace, ...]:
+        """The places of flexible links where stress has no limit, which ``Frame.peak`` leaves out."""
+        return self._discretisation.stresses.singular_places
 
     @property
     def setup_seconds(self) -> float:

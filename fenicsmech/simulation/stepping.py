@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -19,7 +20,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import agreed, from_one
-from fenicsmech.continuation import DeadCentreStepper, LoadStepper, LoadSteps, LoadStepsFailed
+from fenicsmech.continuation import ArcSteps, DeadCentreStepper, LoadStepper, LoadSteps, LoadStepsFailed, follow_to
 from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
@@ -27,13 +28,14 @@ from fenicsmech.equilibrium import (
     LoadControl,
     LoadFactorControl,
     MotorControl,
-    Residual,
+    NotConverged,
     State,
     Unknown,
     joint_reactions,
     motor_torques,
 )
 from fenicsmech.errors import DescriptionError, EquilibriumError, finite
+from fenicsmech.log import logger
 from fenicsmech.mechanism import Configuration, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 from fenicsmech.multibody import (
     Assembly,
@@ -49,6 +51,12 @@ from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestPoses
+
+_log = logger(__name__)
+# work along motions that deform no link, over loads times the greatest velocity
+_BALANCED = 1e-6  # that is small
+_LOST = 1e-4  # that leaves the rest position unknown
+_ROUNDING = 1e-16  # least relative residual
 
 
 @dataclass(frozen=True)
@@ -186,12 +194,15 @@ class CurveStepper:
 
     def _started(self, rest: RestPose, control: Control) -> CurveStart:
         state = self._under_constant_loads(rest.state)
+        return CurveStart(rest, state, self._steps_from(rest, state, control))
+
+    def _steps_from(self, rest: RestPose, state: State, control: Control) -> LoadStepper:
+        """Load steps from the equilibrium under constant loads to which ``rest`` led."""
         self._system.load(state)
         shifts = LoadSteps().least_shifts(state.minimum_shift, loads_resist=rest.loads_resist and not rest.reached)
         kind = DisplacementControl() if control.constrained else LoadControl()
         predictor = self.discretisation.predictor
-        stepper = LoadStepper(self.solver, state, kind, predictor=predictor, shifts=shifts)
-        return CurveStart(rest, state, stepper)
+        return LoadStepper(self.solver, state, kind, predictor=predictor, shifts=shifts)
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
@@ -231,9 +242,16 @@ class CurveStepper:
                 with self.keeping_frames():
                     point = steps.advance(control)
             except LoadStepsFailed as failure:
-                raise self._unreached(control, failure) from failure
+                # the first value was sought from rest
+                found = self._from_rest(control) if steps.snaps and iterations else None
+                if found is None:
+                    raise self._unreached(control, failure) from failure
+                point = found
+            imbalance = 0.0
+            if self.freedom.mobility and not control.constrained:
+                point, imbalance = self._balanced(point, control)
             record = self.record(point)
-            if self.freedom.mobility and not control.constrained and self._imbalance(point.state, control) > 1e-4:
+            if imbalance > _LOST:
                 names = ", ".join(map(repr, self.freedom.mobile))
                 lost = (
                     f"rest position of {names} at force {control.prescribed:g} is lost in the rounding of stiff links"
@@ -249,6 +267,24 @@ class CurveStepper:
             phases=effort.phases,
         )
 
+    def _from_rest(self, control: Control) -> EquilibriumPoint | None:
+        """The equilibrium that load steps from rest reach, of a curve that has left their path by a snap; None if none.
+
+        The path snapped to may end where the one from rest goes on.
+        """
+        start = self._start
+        assert start is not None, "steps that snap have started"
+        stepper = self._steps_from(start.rest, start.state, control)
+        try:
+            with self.keeping_frames():
+                point = stepper.advance(control)
+        except (LoadStepsFailed, EquilibriumError):
+            return None
+        _log.warning("%s: the path snapped to ends; the next equilibria are on that from rest", self.request.where)
+        self._effort += Effort(stepper.iterations, stepper.snaps + 1)
+        self._start = replace(start, steps=stepper)
+        return point
+
     @contextmanager
     def keeping_frames(self) -> Iterator[None]:
         """A context in which errors of potentials, which know no frames, get those so far."""
@@ -263,7 +299,6 @@ class CurveStepper:
         model, state, followed = self._model, point.state, self.followed
         self._system.load(state)
         with model.clock.phase("measure"):
-            stress = float(model.elastic.von_mises().max(initial=0.0))
             value, conjugate = followed.value(self._system, state), followed.conjugate(self._system, state)
             travels = [model.travel(output, state) for output in self._origins]
             value, conjugate, *travels = agreed(self.discretisation.comm, [value, conjugate, *travels])
@@ -276,7 +311,6 @@ class CurveStepper:
                 unstable_modes=point.unstable_modes,
                 stable_under_control=point.unstable_under_control == 0,
                 strain_energy=model.elastic.strain_energy(),
-                max_stress=model.mesh.mesh.comm.allreduce(stress, op=MPI.MAX),
                 outputs=outputs,
                 reactions=joint_reactions(self._joints, state),
                 motors=motor_torques(self._joints, state),
@@ -286,6 +320,7 @@ class CurveStepper:
                 phases={},
                 state=state,
                 design=model.design,
+                stresses=self.discretisation.stresses,
             )
 
     def _unloaded(self, assembly: Assembly) -> State:
@@ -308,26 +343,40 @@ class CurveStepper:
         stepper = DeadCentreStepper(self.solver, state, control, predictor=self.discretisation.predictor)
         # a quarter of a radian, or of the mechanism's length: in space a motor's equation is periodic
         steps = max(int(np.ceil((1.0 - fraction) * self._joints.travel(there - drawn) / 0.25)), 1)
+        start = state
         try:
             for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
                 state = stepper.advance(control.at(float(value))).state
         except LoadStepsFailed as failure:
-            strained = "links and springs" if wound else "the links"
-            beyond = "there" if fraction == 1.0 else f"beyond {failure.reached:.1%} of their way"
-            tried, nearer = failure.reason, "nearer to the drawn ones"
-            if failure.fold is not None:
-                moved = ((motor, position) for motor, position in configuration.positions if position)
-                turn = ", ".join(f"{motor.name!r} at {failure.fold * position:.6g}" for motor, position in moved)
-                tried = f"the path turns back near {turn}; {tried}"
-                nearer = "before the turn, which follow() goes round"
-            raise EquilibriumError(
-                f"configuration {configuration.name!r}",
-                f"the motors strain {strained}, and no equilibrium was found {beyond} ({tried})",
-                f"Choose motor positions {nearer}, or a softer link or spring",
-                last=self._last(failure),
-            ) from failure
+            try:
+                first = self.solver.solve(start, control)
+                point, iterations, _ = follow_to(
+                    self.solver, first.state, control.at(1.0), ArcSteps(), most=LoadSteps().arc_steps
+                )
+            except NotConverged:
+                raise self._unposed(failure, fraction, wound) from failure
+            _log.info("%s: load steps left the path of the motors, which is followed by arc length", self.request.where)
+            state, self._effort = point.state, self._effort + Effort(first.iterations + iterations)
         self._effort += Effort(stepper.iterations, stepper.snaps)
         return state
+
+    def _unposed(self, failure: LoadStepsFailed, fraction: float, wound: bool) -> EquilibriumError:
+        """The error that motors do not reach the configuration, from the ``fraction`` on that links assemble to."""
+        configuration = self.request.configuration
+        strained = "links and springs" if wound else "the links"
+        beyond = "there" if fraction == 1.0 else f"beyond {failure.reached:.1%} of their way"
+        tried, nearer = failure.reason, "nearer to the drawn ones"
+        if failure.fold is not None:
+            moved = ((motor, position) for motor, position in configuration.positions if position)
+            turn = ", ".join(f"{motor.name!r} at {failure.fold * position:.6g}" for motor, position in moved)
+            tried = f"the path turns back near {turn}; {tried}"
+            nearer = "before the turn, which follow() goes round"
+        return EquilibriumError(
+            f"configuration {configuration.name!r}",
+            f"the motors strain {strained}, and no equilibrium was found {beyond} ({tried})",
+            f"Choose motor positions {nearer}, or a softer link or spring",
+            last=self._last(failure),
+        )
 
     def _under_constant_loads(self, state: State) -> State:
         """The configuration under the request's constant forces and the scene's effects, which grow together."""
@@ -340,6 +389,9 @@ class CurveStepper:
             with self.keeping_frames():
                 state = stepper.advance(control.at(1.0)).state
         except LoadStepsFailed as failure:
+            found = self._followed(start, control.at(0.5 * failure.reached)) or self._settled(control)
+            if found is not None:
+                return found
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
             raise self.error(
@@ -349,6 +401,46 @@ class CurveStepper:
                 otherwise="Choose smaller ones",
             ) from failure
         self._effort += Effort(stepper.iterations, stepper.snaps)
+        return state
+
+    def _followed(self, start: State, control: LoadFactorControl) -> State | None:
+        """The first stable equilibrium under all constant loads on the path from ``start`` through that at ``control``,
+        past its turns; None if none is found."""
+        if not control.prescribed:
+            return None
+        stepper = LoadStepper(self.solver, start, control, predictor=self.discretisation.predictor)
+        steps, most = ArcSteps(), LoadSteps().arc_steps
+        try:
+            first = stepper.advance(control)
+            found, iterations, turned = follow_to(
+                self.solver, first.state, control.at(1.0), steps, most=most, past_turns=True
+            )
+        except (LoadStepsFailed, NotConverged, EquilibriumError):  # the last one of a potential, on the way
+            return None
+        if turned:
+            _log.warning("%s: the path of constant loads turns back; curves start where it ends", self.request.where)
+        self._effort += Effort(stepper.iterations + iterations, int(turned))
+        return found.state
+
+    def _settled(self, control: LoadFactorControl) -> State | None:
+        """The equilibrium under all constant loads, from the rigid pose in which springs balance with them; None if
+        none is found.
+
+        Constant loads that are not far weaker than springs swing a mechanism far, past folds where it snaps.
+        """
+        if not self.adrift or (pose := self._rest_poses.balanced()) is None:
+            return None
+        all_loads = control.at(1.0)
+        stepper = LoadStepper(self.solver, all_loads.prepare(pose), all_loads, predictor=self.discretisation.predictor)
+        try:
+            with self.keeping_frames():
+                state = stepper.advance(all_loads).state
+        except LoadStepsFailed:
+            return None
+        _log.warning(
+            "%s: steps of constant loads end early; curves start where these and springs balance", self.request.where
+        )
+        self._effort += Effort(stepper.iterations, 1)
         return state
 
     # -- failures ----------------------------------------------------------------------------------------------
@@ -421,13 +513,40 @@ class CurveStepper:
 
     # -- residual along zero-energy modes -----------------------------------------------------------------------
 
+    def _balanced(self, point: EquilibriumPoint, control: Control) -> tuple[EquilibriumPoint, float]:
+        """The equilibrium at ``point``, or near it if loads balance better there, and their imbalance.
+
+        Beside reactions ten thousand times the loads, a residual that is small leaves motions that these alone resist,
+        as the spin of a link between ball joints, far from where they come to rest: there it must be smaller still.
+        """
+        imbalance, options = self._imbalance(point.state, control), self.solver.options
+        if imbalance <= _BALANCED:
+            return point, imbalance
+        reached = min(options.tolerance, max(point.residuals[-1], _ROUNDING))
+        finer = copy(self.solver)  # with the same factor
+        finer.options = replace(options, tolerance=0.1 * _BALANCED / imbalance * reached)
+        try:
+            found = finer.solve(point.state, control)
+        except NotConverged as failure:
+            self._effort += Effort(failure.iterations)
+            return point, imbalance
+        self._effort += Effort(found.iterations)
+        left = self._imbalance(found.state, control)
+        better = left < 0.5 * imbalance and found.unstable_modes <= point.unstable_modes
+        return (found, left) if better else (point, imbalance)
+
     def _imbalance(self, state: State, control: Control) -> float:
         """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.
 
         Of the work of each reaction, 1e-12 is left by rounding of their sum, which vanishes; 0 where nothing acts, or
-        nothing moves.
+        nothing moves. Links do no work where nothing strains them, however their nodal forces are rounded: those of
+        loads and effects count.
         """
+        self._system.load(state)
         model, joints, residual = self._model, self._joints, self._system.residual(state, control)
+        nodal = -self._system.nodal_loads(state)
+        if model.elastic.depends_on_load_factor:
+            nodal += state.load_factor * model.elastic.load_factor_residuals()[: len(nodal)]
         loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum())
         loads, worst = loads + self._effect_forces(state), 0.0
         reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
@@ -435,11 +554,12 @@ class CurveStepper:
         comm = self.discretisation.comm
         for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
             rounding = 1e-12 * float(reactions @ np.abs(motion.z))
-            worst = max(worst, (self._work(residual, state, motion) - rounding) / motion.fastest(model.linkage.length))
+            work = abs(self._work(nodal, state, motion) + float(residual.rigid @ motion.z))
+            worst = max(worst, (work - rounding) / motion.fastest(model.linkage.length))
         return agreed(comm, worst / loads if loads > 0.0 else 0.0)
 
-    def _work(self, residual: Residual, state: State, motion: Motion) -> float:
-        """|r · u̇ + ∂L/∂z · ż| of a motion."""
+    def _work(self, nodal: np.ndarray, state: State, motion: Motion) -> float:
+        """r · u̇ of ``nodal`` forces r on links, (owned displacements,), along a motion."""
         model, linkage, owned = self._model, self._model.linkage, self._model.interfaces.owned
         u = state.u[: owned * model.interfaces.block].reshape(owned, -1)
         places = u + model.elastic.drawn_nodes[:owned] + model.design_nodes.values(model.elastic.design)[:owned]
@@ -450,8 +570,7 @@ class CurveStepper:
             centre = np.array(linkage.bodies[body].centre) + state.poses[body, : linkage.dim]
             offsets = places[nodes][:, : linkage.dim] - centre
             velocity[nodes, : linkage.dim] = motion.at(body, offsets)
-        nodal = model.mesh.mesh.comm.allreduce(float(residual.nodal @ velocity.ravel()))
-        return abs(nodal + float(residual.rigid @ motion.z))
+        return model.mesh.mesh.comm.allreduce(float(nodal @ velocity.ravel()))
 
     def _effect_forces(self, state: State) -> float:
         """Sum of the sizes of all forces of effects that grow with the load factor."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.stress import designs
 from benchmarks.table import publish
 from benchmarks.verification import CASES
 from fenicsmech.report import format_table
@@ -52,6 +53,13 @@ def test_effects_move_the_finger_and_none_moves_nothing():
     assert moved["joint spring"] < 0.0 < moved["joint compliance"]
     assert moved["contact"] < 0.0
     assert all(value != 0.0 for value in moved.values())
+
+
+@pytest.mark.thorough
+def test_a_limit_of_stress_on_the_claw_holds_beside_its_targets():
+    free, limited = designs("plane-stress")
+    assert limited[3] <= 2.0 * free[3]  # evaluations
+    assert all(abs(error) < 1.0 for error in limited[5:])  # displacements, the limit, and in the exported parts
 
 
 @pytest.mark.slow

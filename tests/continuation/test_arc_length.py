@@ -6,6 +6,7 @@ from mpi4py import MPI
 from scipy.optimize import minimize_scalar
 
 import fenicsmech as fm
+from fenicsmech.continuation import ArcLengthStepper
 
 from ..equilibrium import toggle
 from ..equilibrium.arch import DISPLACEMENTS, RISE, arch, beam_forces
@@ -120,3 +121,18 @@ def test_path_is_the_same_on_any_number_of_ranks():
     sunk = np.array([frame.outputs[case.sunk] for frame in curve.frames])
     assert curve.forces == pytest.approx(toggle.force(sunk), abs=1e-8)
     assert [event.kind for event in curve.events] == [fm.Critical.LIMIT]
+
+
+@pytest.mark.parametrize("until", [fm.Until(displacement=3.0), fm.Until(force=0.5 * toggle.force(2.0))])
+def test_paths_end_at_the_prescribed_value_however_rounding_scatters_their_points(until, monkeypatch):
+    between, rng = ArcLengthStepper.between, np.random.default_rng(0)
+
+    def scattered(self, start, end, distance):
+        return between(self, start, end, distance * (1.0 + 1e-3 * rng.standard_normal()))
+
+    monkeypatch.setattr(ArcLengthStepper, "between", scattered)
+    case = toggle.toggle(stilt_modulus=STIFF)
+    last = case.simulation.follow(case.push, until=until).frames[-1]
+    reached, wanted = (last.force, until.force) if until.force else (last.displacement, until.displacement)
+    assert (reached,) == pytest.approx(wanted, rel=1e-12)
+    assert last.force == pytest.approx(toggle.force(last.outputs[case.sunk]), abs=1e-8)

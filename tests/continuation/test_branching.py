@@ -1,4 +1,4 @@
-"""Bifurcations are found on straight paths, and the paths that cross there are followed."""
+"""Bifurcations are found on straight paths, and the paths that cross there are followed, or stepped onto."""
 
 from math import pi
 
@@ -10,6 +10,7 @@ from scipy.special import ellipe, ellipk
 
 import fenicsmech as fm
 from fenicsmech.continuation import ArcLengthStepper
+from fenicsmech.effects import JointSpring
 
 from ..equilibrium.column import DEPTH, EULER, LENGTH, THICKNESS, YOUNG, Column, column, critical_load
 
@@ -88,6 +89,27 @@ def test_bifurcation_is_located_by_few_equilibria_to_the_accuracy_of_the_eigenva
     assert len(solved) <= most + ending
     assert event.value == pytest.approx(loads[0], rel=1e-6)
     assert event.frame.force == pytest.approx(loads[0], rel=1e-3)
+
+
+def test_load_steps_from_a_stable_equilibrium_end_on_the_stable_branch_beyond_a_bifurcation():
+    # both links of a shallow toggle buckle; pinned, they press with π² EI / ℓ² (1 + shortening / 2 ℓ)
+    half, rise, thickness, down, young = 40.0, 10.0, 4.0, 5.0, 2000.0
+    mechanism, plastic = fm.Mechanism("toggle"), fm.Material("plastic", young, 0.3)
+    base, links, springs = mechanism.rigid("base", fixed=True), [], []
+    for name, x in (("left", -half), ("right", half)):
+        shape = fm.strip([(x, 0), (0, rise)], thickness=thickness, depth=1.0)
+        links.append(mechanism.flexible(name, shape, plastic))
+        pin = mechanism.revolute(base, links[-1], at=(x, 0), interface_radius=0.5 * thickness)
+        springs.append(JointSpring(pin, 10.0))
+    mechanism.revolute(*links, at=(0, rise), interface_radius=0.5 * thickness)
+    push = mechanism.force(on=links[0], at=(0, rise), direction=(0, -1))
+    scene = fm.Scene(mechanism, effects=springs)
+    simulation = fm.Simulation(scene, space="plane-stress", size=thickness, comm=MPI.COMM_SELF)
+    (frame,) = simulation.load_displacement(push, displacements=[down]).frames
+    long, short = np.hypot(half, rise), np.hypot(half, rise - down)
+    load = pi**2 * young * thickness**3 / 12.0 / long**2 * (1.0 + 0.5 * (1.0 - short / long))
+    assert frame.stable_under_control
+    assert frame.force == pytest.approx(2.0 * load * (rise - down) / short, rel=1e-2)
 
 
 def test_an_event_that_is_not_a_bifurcation_of_the_curve_is_refused():

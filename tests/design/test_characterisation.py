@@ -152,3 +152,38 @@ def test_the_error_of_a_modulus_counts_from_a_configuration_that_it_strains_too(
     slope = (travel(fit.youngs_modulus * (1.0 + step)) - travel(fit.youngs_modulus * (1.0 - step))) / (2.0 * step)
     wanted = fit.spread / np.linalg.norm(slope / np.abs(noisy).max())
     assert fit.standard_error / fit.youngs_modulus == pytest.approx(wanted, rel=1e-4)
+
+
+@pytest.mark.thorough
+@pytest.mark.parallel
+def test_parameters_are_found_together():
+    # pulled with free and with held sides: E and E / (1 − ν²) at small strain
+    def rig(material: fm.Material, space: str):
+        mechanism = fm.Mechanism("pull")
+        ground, grip = mechanism.rigid("ground", fixed=True), mechanism.rigid("grip")
+        sample = mechanism.flexible("sample", fm.strip([(-2, 0), (22, 0)], thickness=4.0, depth=4.0), material)
+        mechanism.weld(ground, sample, at=(-1, 0), region=fm.Rectangle(2, 6))
+        mechanism.weld(sample, grip, at=(21, 0), region=fm.Rectangle(2, 6))
+        pull = mechanism.force(on=grip, at=(20, 0), direction=(1, 0))
+        return fm.Simulation(fm.Scene(mechanism), space=space, size=4.0), pull
+
+    forces, experiments, guess = (200.0, 800.0), [], replace(GUESS, law=fm.NeoHookean(1200.0, 0.3))
+    for space in ("plane-stress", "plane-strain"):
+        simulation, pull = rig(TRUE, space)
+        measured = simulation.load_displacement(pull, forces=forces).displacements
+        simulation, pull = rig(guess, space)
+        experiments.append(Experiment(simulation, pull, forces, measured))
+    fit = fm.fit_parameters(experiments, guess, ["E", "nu"])
+    assert fit.values == pytest.approx({"E": 1500.0, "nu": 0.4}, rel=1e-5)
+    assert fit.curves[0].displacements == pytest.approx(experiments[0].displacements, rel=1e-6)
+
+
+def test_a_parameter_alone_has_the_interval_of_the_modulus():
+    bent = [experiment(exact() * [1.0, 1.01, 0.99, 1.0])]
+    alone, modulus = fm.fit_parameters(bent, GUESS, ["E"]), fit_modulus(bent, GUESS)
+    assert alone.values["E"] == pytest.approx(modulus.youngs_modulus, rel=1e-5)
+    assert alone.standard_errors["E"] == pytest.approx(modulus.standard_error, rel=1e-4)
+    with pytest.raises(DescriptionError, match="there is no 'C1'"):
+        fm.fit_parameters(bent, GUESS, ["C1"])
+    with pytest.raises(DescriptionError, match="the names are E, E"):
+        fm.fit_parameters(bent, GUESS, ["E", "E"])

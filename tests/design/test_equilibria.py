@@ -48,6 +48,23 @@ def test_following_a_design_ends_where_its_loading_from_zero_ends(name):
     assert np.array_equal(followed.design.field, both.field())
 
 
+@each_case
+def test_equilibria_that_were_kept_are_those_of_their_design_and_samples_alone(name):
+    both = made(name)
+    first = both.rest.place(both.design(0.03, seed=1), None)
+    assert both.equilibria.kept() is None
+    known = both.equilibria.from_zero()
+    both.equilibria.keep(known)
+    fewer = SampleEquilibria(both.simulation, both.equilibria.targets[-1:], like=both.equilibria)
+    found = fewer.kept()
+    assert found is not None and displacements(found) == pytest.approx(displacements(known)[-1:], rel=1e-12)
+    fewer.keep(found)
+    assert both.equilibria.kept() is None  # it has more samples
+    both.equilibria.keep(known)
+    both.rest.place(both.design(0.03001, seed=1), first)
+    assert both.equilibria.kept() is None
+
+
 @pytest.mark.parallel
 def test_following_in_space_on_any_number_of_ranks():
     both = made("truss", space="3d", size=4.0, order=1, comm=MPI.COMM_WORLD)

@@ -11,7 +11,8 @@ import fenicsmech as fm
 from ..oracles.dense import linear_term
 from .mechanisms import Case, bench
 
-PLASTIC = fm.Material("plastic", 2000.0, 0.35)
+STRENGTH = fm.Strength(yield_stress=40.0, ultimate_stress=60.0, fatigue=fm.Basquin(90.0, -0.1))
+PLASTIC = fm.Material("plastic", 2000.0, 0.35, strength=STRENGTH)
 
 
 class Frame:
@@ -58,8 +59,15 @@ class Frame:
             fm.JointMoment(end),
             fm.StrainEnergy(),
             fm.StrainEnergy(other),
+            fm.LeastGap(leg, other),
+            fm.LeastGap(leg, fm.Cylinder((20.0, 15.0), 5.0)),
+            fm.LargestStress(),
+            fm.LargestStrain(),
+            fm.LeastSafety(other),
+            fm.LeastLife(leg),
         ]
         at_rest = [fm.LinkVolume(), fm.LinkMass(leg, density=3.0), fm.CentrelineLength(other)]
+        at_rest += [fm.LeastThickness(leg), fm.LargestCurvature(leg), fm.LargestCurvature(other, "concave")]
         dim = 3 if space == "3d" else 2
         targets = [fm.Target(own, sample, equals=_zero(own.size(dim)), scale=1.0) for own in quantities]
         targets += [fm.Target(own, equals=0.0, scale=1.0) for own in at_rest]

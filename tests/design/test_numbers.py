@@ -303,6 +303,39 @@ def test_laws_and_depths_of_rigid_links_are_refused():
     refused(lambda: fm.Depth(wall), part="depth", problem="'wall'.*not a flexible link", remedy="Give")
 
 
+def test_coordinates_of_directions_are_no_numbers():
+    fibres = fm.Material("fibres", law=fm.TransverselyIsotropic(30.0, 2.0, 0.3, 0.5, 0.9))
+    rig = fm.Mechanism("strip")
+    strip = rig.flexible("strip", fm.strip([(0, 0), (40, 0)], thickness=3.0, depth=5.0), fibres)
+    assert fm.LawParameter("E_along", strip).described(strip) == 30.0
+    for name in ("along0", "along1"):
+        kind = fm.LawParameter(name, strip)
+        with pytest.raises(fm.DescriptionError, match="direction of the law of 'fibres'.*unit length") as caught:
+            kind.check(fm.Scene(rig), 3)
+        assert "with_material" in caught.value.remedy
+        assert caught.value.remedy.endswith("E_along, E_across, nu_along, nu_across, G_along")
+
+
+@pytest.mark.parametrize(
+    ("law", "moduli"),
+    [
+        (fm.NeoHookean(3.0, 0.4), "E"),
+        (fm.Ogden((1.0, 0.5), (2.0, -2.0), 0.4), "mu0 mu1"),
+        (fm.Gent(1.0, 30.0, 0.4), "mu"),
+        (fm.MooneyRivlin(1.0, 0.2, 0.4), "C10 C01"),
+        (fm.Yeoh(1.0, 0.2, 0.1, 0.4), "C1 C2 C3"),
+        (fm.Orthotropic(10.0, 4.0, 2.0, 0.3, 0.35, 0.4, 1.5, 1.2, 0.7), "E1 E2 E3 G12 G13 G23"),
+        (fm.TransverselyIsotropic(30.0, 2.0, 0.3, 0.5, 0.9), "E_along E_across G_along"),
+    ],
+    ids=lambda own: type(own).__name__,
+)
+def test_moduli_have_the_unit_of_stress(law, moduli):
+    shape, units = fm.strip([(0, 0), (40, 0)], thickness=3.0, depth=5.0), fm.Units()
+    strip = fm.Mechanism("strip").flexible("strip", shape, fm.Material("own", law=law))
+    found = [name for name in law.constants if fm.LawParameter(name, strip).unit(units) == units.stress]
+    assert found == moduli.split()
+
+
 def test_files_of_lengths_in_another_unit_are_warned_of(tmp_path, caplog):
     scene, strip, push = cantilever()
     targets = [fm.Target(push, force=2.0, displacement=1.0)]

@@ -30,7 +30,7 @@ def counts(monkeypatch, space: str, effects=()) -> Counts:
     compiled = []
     plain = fem.form
     monkeypatch.setattr(fem, "form", lambda form, **options: compiled.append(form) or plain(form, **options))
-    scene, push, load = arch()
+    scene, push, load = arch(expansion=4e-5)
     scene = fm.Scene(scene.mechanism, effects=[effect(scene.mechanism) for effect in effects])
     simulation = fm.Simulation(scene, space=space, order=1, size=4.0)
     simulation.load_displacement(push, forces=[0.0, 0.1 * load])
@@ -73,4 +73,9 @@ def test_each_effect_adds_only_its_own(space, monkeypatch):
     assert (spring.unknowns, spring.body_potentials) == (bare.unknowns, 2)
     soft = counts(monkeypatch, space, [lambda m: fm.JointCompliance(m.joints[0], 1e-3)])
     assert soft == bare
+    warm = counts(monkeypatch, space, [lambda m: fm.Temperature(5.0)])
+    # its excess length in the strain energy, the form of the residual's derivative by the load factor, and two of the
+    # stress that Newton's method predicts in steps as long as its first one
+    assert (warm.terms, warm.forms, warm.coefficients) == (bare.terms, bare.forms + 3, bare.coefficients + 1)
+    assert (warm.unknowns, warm.entries, warm.body_potentials) == (bare.unknowns, bare.entries, 0)
     assert counts(monkeypatch, space) == bare

@@ -19,7 +19,7 @@ def single_link(
     cells: np.ndarray,
     *,
     model: ElasticModel,
-    law: type[Law] | None = None,
+    law: Law | type[Law] | None = None,
     order: int = 2,
     young: float = 1.9,
     poisson: float = 0.4,
@@ -28,7 +28,10 @@ def single_link(
     mixed: bool = False,
     comm: MPI.Comm = MPI.COMM_SELF,
 ) -> ElasticBody:
-    """The mesh (points, cells), the same on every rank of ``comm``, as one link that deforms everywhere."""
+    """The mesh (points, cells), the same on every rank of ``comm``, as one link that deforms everywhere.
+
+    ``young`` and ``poisson`` are numbers of a law that is given as a class.
+    """
     if comm.rank > 0:
         points, cells = points[:0], cells[:0]
     mesh = create_mesh(comm, cells.astype(np.int64), points)
@@ -38,7 +41,7 @@ def single_link(
         mesh,
         link=np.zeros(count, dtype=int),
         free=np.ones(count, dtype=bool),
-        materials=[Material("test", law=(law or NeoHookean)(young, poisson))],
+        materials=[Material("test", law=law if isinstance(law, Law) else (law or NeoHookean)(young, poisson))],
         depths=[depth],
         model=model,
         order=order,

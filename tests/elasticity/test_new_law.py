@@ -65,17 +65,16 @@ def free(of, low=0.3, high=2.0) -> float:
     return brentq(of, low, high, xtol=1e-15, rtol=1e-14)
 
 
-@pytest.mark.parametrize("stretch", [0.7, 1.0001, 1.5, 2.0])
+@pytest.mark.parametrize("stretch", [0.7, 1.0001, 1.5, 2.5])
 def test_uniaxial_and_equibiaxial_tension(stretch):
     side = free(lambda s: cauchy([stretch, s, s])[1])
     across = free(lambda s: cauchy([stretch, stretch, s])[2], 0.15, 2.5)
     expected = np.array([cauchy([stretch, side, side]), cauchy([stretch, stretch, across])])
     in_space = stresses(SPATIAL, RUBBER, [[stretch, side, side], [stretch, stretch, across]])
     assert in_space == pytest.approx(expected, rel=1e-10, abs=1e-12)
-    # the local solve finds the free sides: three steps of Newton's method
+    # the local solve finds the free sides
     flat = stresses(PLANE_STRESS, RUBBER, [[stretch, side], [stretch, stretch]])
-    tolerance = 1e-10 if stretch < 2.0 else 5e-8
-    assert flat == pytest.approx(expected, rel=tolerance, abs=tolerance)
+    assert flat == pytest.approx(expected, rel=1e-10, abs=1e-12)
     held = stresses(PLANE_STRAIN, RUBBER, [[stretch, 1.0 / stretch]])
     assert held[0] == pytest.approx(cauchy([stretch, 1.0 / stretch, 1.0]), rel=1e-10)
 

@@ -140,6 +140,7 @@ def test_kkt_matrix_is_symmetric(space, kind):
 def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
     case = crowded(space)
     system = system_of(case, controlled=case.on_rigid)
+    system.unknowns.shift_weights = weights, of_poses = np.random.default_rng(0).random(len(parts_of(system)["u"])), 0.3
     state, control = random_state(case, system), control_of(LoadControl)
     system.load(state)
     system.linearise(state, control, system.residual(state, control))
@@ -147,10 +148,12 @@ def test_shift_raises_the_curvature_of_displacements_and_poses_alone(space):
     plain = matrix.getDiagonal().array.copy()
     parts = parts_of(system)
     for amount in (0.25, 2.0, 0.0):
-        system.kkt.shift(amount)  # from what was assembled, not on top of the last one
-        change = matrix.getDiagonal().array - plain
-        assert change[[*parts["u"], *parts["z"]]] == pytest.approx(amount, abs=1e-14)
-        assert not np.any(change[[*parts["λ"], *parts["f"]]])
+        for weighted, nodes, poses in ((False, 1.0, 1.0), (True, weights, of_poses)):
+            system.kkt.shift(amount, weighted=weighted)  # from what was assembled, not on top of the last one
+            change = matrix.getDiagonal().array - plain
+            assert change[parts["u"]] == pytest.approx(amount * nodes, abs=1e-13)
+            assert change[parts["z"]] == pytest.approx(amount * poses, abs=1e-13)
+            assert not np.any(change[[*parts["λ"], *parts["f"]]])
 
 
 @pytest.mark.parallel

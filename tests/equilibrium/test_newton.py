@@ -1,5 +1,7 @@
 """Newton's iteration converges at its order, and says what went wrong when it does not converge."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -152,3 +154,14 @@ def test_rounding_is_named_as_a_cause_only_where_the_last_two_matrices_have_null
     with pytest.raises(NotConverged, match="after 3 iterations") as caught:
         solver.solve(rest, LoadControl(20.0))
     assert ("rounding of the stiffest link" in str(caught.value)) == named
+
+
+@pytest.mark.parametrize(("before", "steady"), [(1.0, True), (5.0, False), (0.2, False)])
+def test_residuals_below_rounding_have_converged_once_they_neither_fall_nor_rise(before, steady):
+    # soft motions answer to those that fall, and steps that turn stiff links strain these for one iteration
+    simulation, push = finger("plane-stress")
+    solver = simulation.solver(push)
+    rest = simulation.load_displacement(push, forces=[0.0]).frames[0].state
+    solver.system.load(rest)
+    residual = replace(solver.system.residual(rest, LoadControl(0.0)), norm=1e-30, forces=0.0)
+    assert solver.converged(residual, 1e-30 * before) == steady

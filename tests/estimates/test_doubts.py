@@ -147,6 +147,21 @@ def test_contributions_that_cancel_are_doubts():
     assert "contributions of elements cancel" in curve.doubts()[0]
 
 
+@pytest.mark.parametrize(("order", "doubted"), [(1, True), (2, False)])
+def test_elements_too_large_are_doubts_even_where_a_spring_moves_the_point_more_than_the_link(order, doubted):
+    scene, bend, load = cantilever()
+    rig, hand = scene.mechanism, bend.on
+    handle = rig.rigid("handle")
+    slide = rig.prismatic(hand, handle, at=(60, 10), axis=(0, 1, 0))
+    push = rig.force(on=handle, at=(60, 10), direction=(0, -1), name="push")
+    soft = fm.Scene(rig, effects=[fm.JointSpring(slide, 1e-3 * load)])
+    simulation = fm.Simulation(soft, space="plane-stress", order=order, size=3.0)
+    curve = simulation.load_displacement(push, forces=[0.05 * load])
+    assert abs(curve.error_estimates()[0]) < 0.05 * curve.displacements[0]
+    assert ("elements too large" in curve.doubts()[0]) == doubted
+    assert ("elements too large" in curve.doubts(modelling=True)[0]) == doubted
+
+
 @pytest.mark.parametrize(("at", "doubted"), [((30.0, 1.5), True), ((60.0, 0.0), False)])
 def test_forces_at_points_are_doubts_but_in_interfaces(at, doubted):
     rig = fm.Mechanism("strip")

@@ -134,7 +134,9 @@ def test_estimate_falls_with_the_mesh_and_vanishes_without_load():
 def test_estimate_takes_half_of_the_factors_of_its_frame_at_most(monkeypatch):
     simulation, push, forces = grasping()
     factored, refactor = [], EquilibriumSolver.factor
-    monkeypatch.setattr(EquilibriumSolver, "factor", lambda *args: factored.append(1) or refactor(*args))
+    monkeypatch.setattr(
+        EquilibriumSolver, "factor", lambda *args, **options: factored.append(1) or refactor(*args, **options)
+    )
     curve = simulation.load_displacement(push, forces=forces)
     frames = len(factored)
     curve.error_estimates()

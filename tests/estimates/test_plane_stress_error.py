@@ -36,7 +36,14 @@ def test_estimate_is_near_what_space_adds(name):
     assert 0.5 < curve.modelling_errors()[-1] / added < 2.0
 
 
-def strip(depth: float, length: float, turn: float = 0.0, poisson: float = 0.4, pinned: bool = False):
+def strip(
+    depth: float,
+    length: float,
+    turn: float = 0.0,
+    poisson: float = 0.4,
+    pinned: bool = False,
+    law: fm.Law | None = None,
+):
     """A link of thickness 1 that opens by ``turn``, a force that bends it, and the load EI / L² of a cantilever.
 
     Its ends are clamped to the wall and to a hand that is pushed across; or they are pinned, and the hand slides.
@@ -47,7 +54,11 @@ def strip(depth: float, length: float, turn: float = 0.0, poisson: float = 0.4, 
     points = [(0.0, 0.0), (length, 0.0)]
     if turn:
         points = [(length / turn * sin(angle), length / turn * (1.0 - cos(angle))) for angle in angles]
-    link = rig.flexible("link", fm.strip(points, thickness=1.0, depth=depth), fm.Material("plastic", 1000.0, poisson))
+    link = rig.flexible(
+        "link",
+        fm.strip(points, thickness=1.0, depth=depth),
+        fm.Material("plastic", law=law or fm.NeoHookean(1000.0, poisson)),
+    )
     if pinned:
         rig.prismatic(wall, hand, at=points[-1], axis=(1, 0, 0))
         rig.revolute(wall, link, at=points[0], interface_radius=1.0)
@@ -91,6 +102,28 @@ def test_estimate_finds_how_much_stiffer_wide_thin_strips_are_in_space(depth, le
     deep = fm.Simulation(scene, space="3d-symmetric", size=2.0, layers=2)
     found = estimate_over_true(flat, deep, push, [0.05 * load, load])
     assert np.all((found > 0.5) & (found < 2.0))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("along", [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0, 1.0)])
+def test_estimate_finds_how_much_stiffer_wide_strips_of_fibres_are_in_space(along):
+    scene, push, load = strip(10.0, 10.0, law=fm.TransverselyIsotropic(3000.0, 1000.0, 0.3, 0.5, 300.0, along=along))
+    flat = fm.Simulation(scene, space="plane-stress", size=2.0)
+    deep = fm.Simulation(scene, space="3d-symmetric", size=2.0, layers=2)
+    found = estimate_over_true(flat, deep, push, [0.05 * load, load])
+    assert np.all((found > 0.5) & (found < 2.0))
+
+
+@pytest.mark.parallel
+def test_any_number_of_ranks_estimates_the_same_of_fibres():
+    scene, push, load = strip(10.0, 10.0, law=fm.TransverselyIsotropic(3000.0, 1000.0, 0.3, 0.5, 300.0, along=(1, 0)))
+    alone, together = (
+        fm.Simulation(scene, space="plane-stress", size=2.0, comm=comm)
+        .load_displacement(push, forces=[load])
+        .modelling_errors()
+        for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
+    )
+    assert together == pytest.approx(alone, rel=1e-6)
 
 
 @pytest.mark.thorough

@@ -57,7 +57,8 @@ def test_every_figure_has_a_source_and_a_test_and_lies_in_its_range(name):
         assert each.si < 0.0 if each.name == "fatigue_exponent" else each.si > 0.0
         assert each.low is None or each.low <= each.value
         assert each.high is None or each.high >= each.value
-    for wanted in ("nu", "density", "ultimate_stress", "ultimate_strain", "fatigue_coefficient", "fatigue_exponent"):
+    fatigue = ("fatigue_coefficient", "fatigue_exponent")
+    for wanted in ("nu", "density", "expansion", "ultimate_stress", "ultimate_strain", *fatigue):
         assert (card.figure(wanted) is None) == (wanted in dict(card.missing)), f"{wanted} is neither given nor missing"
 
 
@@ -95,6 +96,7 @@ def test_units_of_sources_are_converted_as_defined():
     assert figure("PP", "E").si == pytest.approx(195e3 * 6894.757293, rel=1e-9)  # NIST SP 811: 1 psi in Pa
     assert figure("titanium", "density").si == pytest.approx(8.7 * 515.3788, rel=1e-6)  # slug/ft³ in kg/m³
     assert figure("POM", "yield_strain").si == pytest.approx(0.09)
+    assert fm.material("POM", units=METRES).expansion == pytest.approx(1.1e-4)
     inches = fm.Units("in", "lbf", "psi")
     steel = fm.material("spring steel", units=inches)
     assert steel.law.E == pytest.approx(206e9 / 6894.757293, rel=1e-9)

@@ -194,3 +194,14 @@ def test_multipliers_without_self_stress_balance_the_same_forces_with_the_least_
     assert bool(np.abs(found - given).max() > 1e-3) == (redundancy > 0)
     # a soft joint tells its own multiplier
     assert system.without_self_stress(given, poses, still, np.ones(system.rows)) == pytest.approx(given, rel=1e-12)
+
+
+def test_gaps_of_joints_keep_their_digits_below_the_rounding_of_positions(system):
+    # compliant pins exert forces in proportion
+    gap = 1e-19 * system.length * np.arange(1.0, 1.0 + system.space.dim)
+    for connection in system.connections:
+        if connection.kind.shares_point:
+            poses = system.drawn.copy()
+            poses[connection.b, : system.space.dim] = gap
+            rows = [row for row, name in enumerate(system.row_names) if name == connection.name][: system.space.dim]
+            assert system.value(poses, -system.offsets)[rows] == pytest.approx(gap, rel=1e-12)

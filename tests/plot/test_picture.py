@@ -64,7 +64,7 @@ def test_a_mechanism_is_drawn_with_all_its_parts_and_the_same_bytes_every_time(t
 
 
 def test_values_colour_the_flexible_links(tmp_path):
-    stress = np.linspace(0.0, 50.0, 240)
+    stress = np.linspace(0.0, 50.0, 3 * 240).reshape(-1, 3)
     draw_mechanism(tmp_path / "plain.png", undeformed=mechanism(), deformed=[mechanism(5.0)])
     draw_mechanism(
         tmp_path / "stress.png", undeformed=mechanism(), deformed=[mechanism(5.0, stress)], colour_label="stress [MPa]"
@@ -73,7 +73,7 @@ def test_values_colour_the_flexible_links(tmp_path):
     assert png_size(tmp_path / "stress.png")[0] > png_size(tmp_path / "plain.png")[0]  # the colour bar
 
 
-@pytest.mark.parametrize("values", [np.zeros(240), np.full(240, -2.0), np.eye(1, 240)[0]])
+@pytest.mark.parametrize("values", [np.zeros((240, 3)), np.full((240, 3), -2.0), np.eye(240, 3)])
 def test_values_without_spread_and_single_peaks_are_drawn(tmp_path, values):
     points, triangles = rectangle(40, 3, 60.0, 4.0)
     shape = MechanismShape((FlexibleShape(points, triangles, values),))
@@ -84,7 +84,7 @@ def test_values_without_spread_and_single_peaks_are_drawn(tmp_path, values):
 def test_a_solid_is_drawn_from_above_with_the_values_of_its_top_cells(tmp_path):
     points, tets = box(10, 2, 2, (30.0, 4.0, 6.0))
     triangles, cells = plan_view(points, tets)
-    shape = FlexibleShape(points[:, :2], triangles, np.arange(len(tets))[cells])
+    shape = FlexibleShape(points[:, :2], triangles, np.tile(np.arange(len(tets))[cells, None], 3))
     draw_mechanism(tmp_path / "solid.png", undeformed=MechanismShape((shape,)))
     assert png_size(tmp_path / "solid.png")[0] > 800
 
@@ -167,7 +167,7 @@ TRIANGLE = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
         (lambda: FlexibleShape(TRIANGLE, [(0, 1, 3)], name="rod"), "triangles of flexible shape 'rod'"),
         (lambda: FlexibleShape(TRIANGLE, np.empty((0, 3), int)), "no triangle"),
         (lambda: FlexibleShape(TRIANGLE * np.nan, [(0, 1, 2)]), "Give finite numbers"),
-        (lambda: FlexibleShape(TRIANGLE, [(0, 1, 2)], values=[1.0, 2.0, 3.0]), "one per triangle"),
+        (lambda: FlexibleShape(TRIANGLE, [(0, 1, 2)], values=[1.0, 2.0, 3.0]), "corners of triangles"),
         (lambda: RigidShape([(0, 0), (1, 1)], "bar"), "rigid shape 'bar'.*at least 3"),
         (lambda: Pin((0, 0, 0)), "position of a pin"),
         (lambda: Arrow((0, 0), (np.inf, 0), "load"), "vector of arrow 'load'"),

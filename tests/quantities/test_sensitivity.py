@@ -18,7 +18,7 @@ from ..oracles.dense import linear_term, taylor_rates
 pytestmark = pytest.mark.parallel
 
 COMMS = {"alone": MPI.COMM_SELF, "together": MPI.COMM_WORLD}
-PLASTIC = fm.Material("plastic", 2000.0, 0.35)
+PLASTIC = fm.Material("plastic", 2000.0, 0.35, expansion=1e-4)
 FORCE, PLACE = 8.0, 1.5
 
 

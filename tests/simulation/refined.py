@@ -50,11 +50,12 @@ def cantilever() -> tuple[fm.Scene, object, float]:
     return fm.Scene(rig), rig.force(on=hand, at=(60, 0), direction=(0, 1)), 3.0
 
 
-def arch() -> tuple[fm.Scene, object, float]:
-    """A curved link pressed together by its pins."""
+def arch(expansion: float | None = None) -> tuple[fm.Scene, object, float]:
+    """A curved link pressed together by its pins; the thermal expansion of its material."""
+    nylon = fm.Material("nylon", law=fm.ONYX.law, density=fm.ONYX.density, expansion=expansion)
     rig = fm.Mechanism("arch")
     ground, slide = rig.rigid("ground", fixed=True), rig.rigid("slide")
-    link = rig.flexible("link", fm.strip([(0, 0), (20, 9), (40, 0)], thickness=3.0, depth=5.0), fm.ONYX)
+    link = rig.flexible("link", fm.strip([(0, 0), (20, 9), (40, 0)], thickness=3.0, depth=5.0), nylon)
     rig.revolute(ground, link, at=(0, 0), interface_radius=2.5)
     rig.revolute(link, slide, at=(40, 0), interface_radius=2.5)
     rig.prismatic(ground, slide, at=(40, 0), axis=(1, 0, 0))

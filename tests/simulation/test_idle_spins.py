@@ -198,3 +198,56 @@ def test_forces_at_ball_joints_leave_their_links_idle():
         assert (curve.freedom.zero_energy, curve.remarks) == ((), ())
         travels.append(curve.displacements)
     assert travels[0] == pytest.approx(travels[1], rel=1e-8)
+
+
+def test_coupler_turns_its_flat_side_to_its_weight():
+    """What resists its spin is of second order in the weight; the sag is that of a beam about the weaker axis."""
+    m = fm.Mechanism("RSSR four-bar")
+    ground, crank, rocker = m.rigid("ground", fixed=True), m.rigid("crank"), m.rigid("rocker")
+    length, width, depth, young, density, g = 60.0, 3.0, 2.0, 1770.0, 1e-9, 1e6
+    material = fm.Material("flat", E=young, nu=0.0, density=density)
+    strip = fm.strip([(20, 0), (20 + length, 0)], thickness=width, depth=depth)
+    coupler = m.flexible("coupler", strip, material)
+    m.motor(m.revolute(ground, crank, at=(0, 0, 0)))
+    m.spherical(crank, coupler, at=(20, 0, 0), interface_radius=1.0)
+    m.spherical(coupler, rocker, at=(20 + length, 0, 0), interface_radius=1.0)
+    m.revolute(rocker, ground, at=(80, 0, 40), axis=(0, 1, 0))
+    push = m.force(on=rocker, at=(80, 0, 10), direction=(-1, 0, 0), name="push")
+    down = tuple(np.array([0.0, -1.0, -1.0]) / np.sqrt(2.0))
+    middle = m.output(on=coupler, at=(20 + length / 2, 0, 0), direction=down, name="middle")
+    scene = fm.Scene(m, effects=[fm.Gravity(tuple(g * np.array(down)))])
+    frame = fm.Simulation(scene, space="3d", size=3.0).load_displacement(push, forces=[0.0]).frames[-1]
+    sag = 5.0 * density * g * width * depth * length**4 / (384.0 * young * width * depth**3 / 12.0)
+    assert (frame.unstable_modes, frame.snapped_through) == (0, False)
+    assert frame.outputs[middle] == pytest.approx(sag, rel=0.03)
+    assert frame.iterations <= 40
+
+
+def pendulum():
+    """A rod with an arm that hangs between two balls, its ``load`` at the arm's end; the angle is known exactly."""
+    m = fm.Mechanism("pendulum")
+    ground, arm = m.rigid("ground", fixed=True), m.rigid("arm")
+    rod = m.flexible("rod", fm.strip([(0, 0), (60, 0)], thickness=3.0, depth=3.0), fm.ONYX)
+    m.spherical(ground, rod, at=(0, 0, 0), interface_radius=1.5)
+    m.weld(rod, arm, at=(60, 0, 0), interface_radius=1.5)
+    m.spherical(arm, ground, at=(70, 0, 0))
+    end = (60, -10, 0)
+    forces = [m.force(on=arm, at=end, direction=d, name=n) for n, d in (("load", (0, -1, 0)), ("side", (0, 0, 1)))]
+    return fm.Simulation(fm.Scene(m), space="3d", size=4.0), *forces
+
+
+def test_spins_that_loads_resist_firmly_take_few_iterations():
+    simulation, load, side = pendulum()
+    forces = [0.02, 0.05, 0.1, 0.3]
+    curve = simulation.load_displacement(side, forces=forces, others={load: 0.1})
+    for force, frame in zip(forces, curve.frames, strict=True):
+        assert frame.displacement == pytest.approx(10.0 * np.sin(np.arctan(force / 0.1)), rel=0.01)
+        assert (frame.unstable_modes, frame.snapped_through) == (0, False)
+        assert frame.iterations <= 18
+
+
+def test_pendulum_pushed_up_stays_in_its_unstable_equilibrium_and_is_told_so():
+    simulation, load, _ = pendulum()
+    curve = simulation.load_displacement(load, forces=[0.5, -0.5])
+    assert [frame.unstable_modes for frame in curve.frames] == [0, 1]
+    assert abs(curve.frames[-1].displacement) < 1.0

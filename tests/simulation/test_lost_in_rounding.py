@@ -1,12 +1,15 @@
-"""A load too small to be felt beside the rounding of stiff links is refused where nothing else holds the mechanism."""
+"""Loads far below the rounding of stiff links turn what nothing else holds, unless they cannot be followed."""
 
+from collections.abc import Callable
+
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
 
 
-def pendulum(modulus: float) -> tuple[fm.Simulation, object]:
+def pendulum(modulus: float, effect: Callable[[object], list] = lambda blade: []) -> tuple[fm.Simulation, object]:
     """A blade on a hinge; the force pulls it out of its dead centre, as drawn."""
     mechanism = fm.Mechanism("pendulum")
     base = mechanism.rigid("base", fixed=True)
@@ -15,17 +18,35 @@ def pendulum(modulus: float) -> tuple[fm.Simulation, object]:
     )
     mechanism.revolute(base, blade, at=(0, 0), interface_radius=1.0)
     push = mechanism.force(on=blade, at=(30, 0), direction=(0.8, 0.6))
-    return fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
+    scene = fm.Scene(mechanism, effects=effect(blade))
+    return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
 
 
-def test_a_load_that_is_felt_turns_the_blade_until_it_pulls_along_it():
-    simulation, push = pendulum(2e3)
-    (frame,) = simulation.load_displacement(push, forces=[1.0]).frames
-    assert frame.state.poses[1, 2] == pytest.approx(0.6435, abs=1e-3)  # arctan 3/4
+def pressed(blade) -> list:
+    """A pressure that balances on the blade, far larger than the load; what it leaves by rounding is far smaller.
+
+    Of nodal forces p A, A = 240 mm², sums keep 2e-16 p A, which turns the blade by that over the load: 5e-9 rad.
+    """
+    return [fm.Pressure(blade, 1e-4)]
 
 
-def test_a_load_that_is_not_felt_is_refused():
-    simulation, push = pendulum(2e11)
+@pytest.mark.parametrize(
+    "modulus, load, effect",
+    [
+        pytest.param(2e3, 1.0, lambda blade: [], id="felt"),
+        pytest.param(2e5, 1e-9, lambda blade: [], id="below the rounding of the blade"),
+        pytest.param(2e11, 1e-12, lambda blade: [], id="far below"),
+        pytest.param(2e5, 1e-9, pressed, id="below that under a pressure"),
+    ],
+)
+def test_a_load_turns_the_blade_until_it_pulls_along_it(modulus, load, effect):
+    simulation, push = pendulum(modulus, effect)
+    (frame,) = simulation.load_displacement(push, forces=[load]).frames
+    assert frame.state.poses[1, 2] == pytest.approx(np.arctan(0.75), abs=1e-3 if load == 1.0 else 1e-7)
+
+
+def test_a_load_that_is_not_felt_is_refused_where_an_obstacle_is_in_the_way():
+    simulation, push = pendulum(2e11, lambda blade: [fm.Contact(blade, fm.Cylinder((20.0, 8.0), 3.0))])
     with pytest.raises(fm.EquilibriumError, match="Nothing but the force holds 'blade'"):
         simulation.load_displacement(push, forces=[1e-12])
 

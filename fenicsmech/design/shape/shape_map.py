@@ -42,6 +42,8 @@ from fenicsmech.meshing import (
 )
 from fenicsmech.polygons import chord_lengths
 
+_HANDLES = 100  # along a link, at most: the memory for their weights grows with the square, and splines are smooth
+
 
 @dataclass(frozen=True, eq=False)
 class ShapeRequest:
@@ -172,7 +174,8 @@ def shape_link(mesh: LinkMesh, request: ShapeRequest, others: Sequence[LinkMesh]
     layout = lay_out(request.centreline, joints, request.reach, request.segments, part=f"design of {part}")
     moves = {"ends_move": request.ends_move, "joints_move": request.joints_move}
     fit = fit_spline(request.centreline, joints, layout, **moves, part=f"spline of {part}")
-    spacing = _mean_width(mesh, request.centreline.length)
+    length = request.centreline.length
+    spacing = max(_mean_width(mesh, length), length / _HANDLES)
     handles = _place_handles(mesh, fit, spacing=spacing, turns=request.turns, part=part)
     weights, edges = _weights(mesh, handles, part=part)
     images = []

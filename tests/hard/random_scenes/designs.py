@@ -20,6 +20,9 @@ from .thresholds import THRESHOLDS
 
 UNMET = "designed: two starts meet no target"
 _DENSITY = 1e-9
+_HEARD = (
+    1e-13  # load over the stiffest link's modulus, depth and the length, above which links are not lost in rounding
+)
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,9 @@ def design_scene(seed: int) -> DesignScene:
         scene = planar_scene(rng, "plane-stress")
         load = bending_force(min(scene.flexible, key=bending_force)) * decade(rng, -2.0, -0.3)
         at_pin = any(joint.at == scene.forces[0].at for joint in scene.joints)
-        if (scene.motors or scene.topology == "two-link arch") and not at_pin:
+        stiffest = max(link.young * link.depth for link in scene.flexible) * scene.length
+        heard = load > _HEARD * stiffest  # motors turn stiff links, whose nodal forces are rounded
+        if (scene.motors or scene.topology == "two-link arch") and not at_pin and heard:
             break
     motors = tuple(replace(motor, position=0.0) for motor in scene.motors)
     links = tuple(replace(link, size=1.5 * link.thickness) if link.centreline else link for link in scene.links)
@@ -96,6 +101,18 @@ def run(scene: DesignScene) -> tuple[str, str]:
     Raises:
         FenicsmechError: of the drawn mechanism, or an optimisation.
     """
+    try:
+        return _optimised(scene)
+    except fm.FenicsmechError as error:
+        if "Use smaller elements" not in str(error):
+            raise
+        links = tuple(replace(link, size=0.5 * link.size) for link in scene.blueprint.links)
+        _optimised(replace(scene, blueprint=replace(scene.blueprint, links=links)))
+        return "refused: elements too large for handles, smaller ones are not", str(error)
+
+
+def _optimised(scene: DesignScene) -> tuple[str, str]:
+    """Outcome and detail."""
     built = build(scene.blueprint)
     (frame,) = built.curve(scene.blueprint).frames
     if abs(frame.displacement) < THRESHOLDS.closed * scene.blueprint.length:

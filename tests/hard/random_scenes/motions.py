@@ -24,22 +24,24 @@ def body_modes(potential: Potential, places: list[Place]) -> np.ndarray:
 
 
 def null_motions(
-    potential: Potential, places: list[Place], residual: Callable[[list[Place]], np.ndarray]
+    potential: Potential,
+    places: list[Place],
+    residual: Callable[[list[Place]], np.ndarray],
+    among: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Velocities of all bodies along which a dimensionless ``residual`` of their places stays, as ``body_modes``."""
-    count, size, length = len(places), (3 if potential.blueprint.dim == 2 else 6), potential.blueprint.length
-    dim = potential.blueprint.dim
-    scale = np.array([1.0] * dim + [1.0 / length] * (size - dim))
-    columns, names = [], [i for i in range(count) if not potential.fixed[i]]
-    for body in names:
-        for k in range(size):
-            velocity = np.zeros((count, size), dtype=complex)
-            velocity[body, k] = 1j * STEP * scale[k]
-            rates = residual(moved(places, velocity)).imag / STEP * length
-            columns.append(rates.astype(float))
-    jacobian = np.array(columns).T.reshape(-1, len(columns))
+    """Velocities of all bodies along which a dimensionless ``residual`` of their places stays, as ``body_modes``:
+    ``among`` these, or all."""
+    length, dim = potential.blueprint.length, potential.blueprint.dim
+    if among is None:
+        count, size = len(places), (3 if dim == 2 else 6)
+        scale = np.array([1.0] * dim + [1.0 / length] * (size - dim))
+        free = [body for body in range(count) if not potential.fixed[body]]
+        among = np.zeros((len(free), size, count, size))
+        for row, body in enumerate(free):
+            among[row, :, body] = np.diag(scale)
+        among = among.reshape(-1, count, size)
+    rates = [residual(moved(places, 1j * STEP * velocity)).imag / STEP * length for velocity in among]
+    jacobian = np.array(rates, dtype=float).reshape(len(among), -1).T
     _, values, right = np.linalg.svd(jacobian, full_matrices=True)
     null = right[int(np.sum(values > THRESHOLDS.rank * max(values.max(initial=0.0), 1.0))) :]
-    modes = np.zeros((len(null), count, size))
-    modes[:, names] = null.reshape(len(null), len(names), size) * scale
-    return modes
+    return np.tensordot(null, among, 1)

@@ -1,8 +1,15 @@
-"""The least stretch of flexible links that is found for the force's point to get where it is prescribed to be.
+"""How far the force's point may get: by the lengths of rigid links, and by the least stretch that is found for flexible
+ones.
 
-A link is replaced by strings between its joints and the point of the force, s the length of link between the ends of a
-string and d their distance: nothing resists while d < s. Rigid links, joints and motors are as they are; springs are
-left out. Then the minimum over all poses, m strings,
+Joints at pins x₀ on the ground, x₁, … of a chain of rigid links keep a point P of its last one within
+
+    |P − x₀| ≤ ρ = |x₁ − x₀| + … + |P − xₙ|,
+
+so that it travels by no more than d · (x₀ − P) ± ρ along d, which is exact.
+
+A flexible link is replaced by strings between its joints and the point of the force, s the length of link between the
+ends of a string and d their distance: nothing resists while d < s. Rigid links, joints and motors are as they are;
+springs are left out. Then the minimum over all poses, m strings,
 
     c = min Σ ⟨d / s − 1⟩² + w² (|gaps of joints|² + |travel − wanted|²)
 
@@ -14,6 +21,7 @@ only if it is the global one, which nothing here proves.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -21,7 +29,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.spatial.transform import Rotation
 
-from .blueprint import LinkPlan
+from .blueprint import Blueprint, CompliancePlan, LinkPlan
 from .closure import Place
 from .potential import Potential
 from .thresholds import THRESHOLDS
@@ -29,6 +37,7 @@ from .thresholds import THRESHOLDS
 _STEPS = 8  # from the travel that is known to the wanted one
 _STARTS, _APART = 6, np.pi  # poses at random, and by how many rad or lengths of the mechanism they are off at most
 _EVALUATIONS, _TOLERANCE = 100, 1e-6  # of a fit
+_WITHIN = 0.9  # of an interface's radius: meshes have polygons for circles
 _CLOSE = 1e-3  # between the stretches of fits to the same minimum
 
 
@@ -38,6 +47,47 @@ class _String:
 
     ends: tuple[tuple[int, int], tuple[int, int]]
     length: float
+
+
+def beyond_chains(scene: Blueprint, travel: float) -> float:
+    """How far a ``travel`` of the forces' points from the drawn configuration is beyond the reach of rigid links on the
+    ground, over the mechanism's length; −∞ where flexible links, slides or joints that give way are in between.
+
+    A point in the interface of a flexible link's joint moves with that as a rigid body."""
+    soft = {plan.joint for plan in scene.effects if isinstance(plan, CompliancePlan)}
+    pins = {joint.name: joint for joint in scene.joints if joint.kind != "prismatic" and joint.name not in soft}
+
+    def chains(link: LinkPlan, point: np.ndarray, passed: tuple[str, ...]) -> Iterator[tuple[np.ndarray, float]]:
+        """x₀ and ρ of the chains that end at a ``point`` of a link."""
+        if link.fixed:
+            yield point, 0.0
+        if link.fixed:
+            return
+        for joint in pins.values():
+            if link.name in (joint.a, joint.b) and joint.name not in passed:
+                other, pin = scene.link(joint.b if link.name == joint.a else joint.a), _in_space(joint.at)
+                arm = float(np.linalg.norm(point - pin))
+                radius = joint.interface if isinstance(joint.interface, float) else 0.0  # clamps are not turned about
+                if link.centreline and not arm < _WITHIN * radius:
+                    continue
+                for ground, reach in chains(other, pin, (*passed, joint.name)):
+                    yield ground, reach + arm
+
+    least = most = 0.0
+    for ratio, force in zip(scene.ratios, scene.forces, strict=False):
+        point, direction = _in_space(force.at), _in_space(force.direction)
+        direction *= ratio / np.linalg.norm(direction)
+        found = [
+            (direction @ (ground - point), abs(ratio) * reach)
+            for ground, reach in chains(scene.link(force.on), point, ())
+        ]
+        least += max((middle - reach for middle, reach in found), default=-np.inf)
+        most += min((middle + reach for middle, reach in found), default=np.inf)
+    return max(travel - most, least - travel) / scene.length
+
+
+def _in_space(vector: tuple[float, ...]) -> np.ndarray:
+    return np.array((*vector, 0.0)[:3])
 
 
 def least_stretch(potential: Potential, u: np.ndarray, poses: np.ndarray, travel: float) -> float:

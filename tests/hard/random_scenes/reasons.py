@@ -19,7 +19,7 @@ from .blueprint import Blueprint, Built, CompliancePlan, ContactPlan, GravityPla
 from .closure import Place
 from .motions import STEP, body_modes, moved
 from .potential import Potential
-from .reach import least_stretch
+from .reach import beyond_chains, least_stretch
 from .residual_check import check, fault
 from .stability_check import stiffness_left
 from .thresholds import THRESHOLDS
@@ -146,6 +146,23 @@ def drowned(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) ->
     return _excuse(reason, "stiffness over the stiffest link's", share, below=THRESHOLDS.drowned)
 
 
+def unheard(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """Motors turn stiff links, and the force is smaller than the rounding of one of their nodal forces.
+
+    Displacements about as large as the mechanism's length ℓ are rounded to 1e-16 of themselves, nodal stiffnesses of
+    links of width b and modulus E are E b: F < 1e-16 E b ℓ.
+    """
+    last = failure.last
+    # not on the way to the motors' positions or constant loads
+    under_it = "no equilibrium at force" in failure.problem and (last is None or last.state.load_factor == 1.0)
+    if blueprint.control != "forces" or not blueprint.motors or not under_it:
+        return None
+    force = max((abs(size) for _, size in Potential.of(blueprint, built.simulation).acting(_asked(blueprint, failure))))
+    share = force / (max(link.young * link.depth for link in blueprint.flexible) * blueprint.length)
+    reason = "a force below the rounding of one nodal force of stiff links"
+    return _excuse(reason, "force over that", share / THRESHOLDS.unheard, below=1.0)
+
+
 def at_limit(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
     """The last equilibrium, a stable one, has all but lost the stiffness of the softest mode of the unloaded scene.
 
@@ -166,7 +183,8 @@ def at_limit(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -
 
 
 def out_of_reach(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
-    """No pose was found in which the point is where it is prescribed to be and flexible links keep their shape.
+    """Rigid links do not reach where the point is prescribed to be; or no pose was found in which it is there and
+    flexible links keep their shape.
 
     Displacements count from the unloaded configuration, travels from the drawn one.
     """
@@ -177,6 +195,9 @@ def out_of_reach(blueprint: Blueprint, built: Built, failure: fm.EquilibriumErro
     places = potential.places(last.state.poses)
     travel = float(np.real(potential.led_travel(potential.nodal(potential.fields(last.state.u)[0], places), places)))
     wanted = travel + _asked(blueprint, failure) - last.displacement
+    beyond = beyond_chains(blueprint, wanted)
+    if excuse := _excuse("out of reach", "beyond rigid links, over length", beyond, above=THRESHOLDS.joined):
+        return excuse
     stretch = least_stretch(potential, last.state.u, last.state.poses, wanted)
     return _excuse("out of reach", "least stretch found", stretch, above=THRESHOLDS.unreached)
 
@@ -247,7 +268,7 @@ def _constant_forces(blueprint: Blueprint) -> Blueprint | None:
 
 
 _Reason = Callable[[Blueprint, Built, fm.EquilibriumError], Excuse | None]
-_BY_GEOMETRY: tuple[_Reason, ...] = (immobile, adrift, drowned)
+_BY_GEOMETRY: tuple[_Reason, ...] = (immobile, adrift, drowned, unheard)
 _BY_STATE: tuple[_Reason, ...] = (at_limit, out_of_reach, inverted, overstrained, turned_back)
 
 
@@ -271,7 +292,7 @@ def _drawn_motions(potential: Potential) -> list[_Motion]:
     if potential.blueprint.dim == 3:
         poses[:, 3] = 1.0
     still = np.zeros(potential.mesh.nodes.shape)
-    return [(du, there) for du, there, _ in unstrained_motions(potential, still, potential.places(poses))]
+    return [(motion.du, motion.there) for motion in unstrained_motions(potential, still, potential.places(poses))]
 
 
 def _resistance(potential: Potential, motions: list[_Motion]) -> tuple[np.ndarray, np.ndarray]:

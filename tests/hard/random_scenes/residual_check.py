@@ -93,7 +93,7 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         floor=floor,
         travel_error=abs(travel - frame.displacement) / length,
         energy_error=abs(energy - frame.strain_energy) / max(abs(frame.strain_energy), _energy_digits(potential)),
-        unstrained_work=unstrained_work(potential, frame.force, followed, places, floor=floor, reaction=scale),
+        unstrained_work=unstrained_work(potential, frame.force, followed, p, places, floor=floor, reaction=scale),
     )
 
 
@@ -160,7 +160,8 @@ def _floor(potential: Potential, u: np.ndarray, places: list[Place]) -> float:
     Displacements are rounded to 1e-16 of the largest one, all nodes independently. Here F = 1 + ∇u is rounded to half
     the ε of ``REAL`` whatever ∇u is, stresses by that much of the modulus, at all quadrature points independently. Both
     lead to nodal forces by the gradients of shape functions, which grow with their order (``Potential.rounding``).
-    The ends of joints that give way are rounded to 1e-16 of their displacements.
+    The ends of joints that give way are rounded as the poses of their bodies: to 1e-16 of the shift of its centre, and
+    of what turning about that adds; the force that this makes acts on both of them.
     """
     squares = 0.0
     for link in potential.blueprint.flexible:
@@ -171,8 +172,11 @@ def _floor(potential: Potential, u: np.ndarray, places: list[Place]) -> float:
     for name, compliance in potential.closure.soft.items():
         joint = potential.blueprint.joint(name)
         at = np.array((*joint.at, 0.0)[: potential.blueprint.dim])
-        for body in potential.closure.ends[name]:
-            squares += float(np.sum((places[body].displacement(at).real * 1e-16 / compliance) ** 2))
+        ends = potential.closure.ends[name]
+        for body in ends:
+            shift = places[body].shift
+            for part in (shift, places[body].displacement(at)[: len(shift)] - shift):
+                squares += len(ends) * float(np.sum((part.real * 1e-16 / compliance) ** 2))
     return float(np.sqrt(squares))
 
 

@@ -101,6 +101,22 @@ def test_the_check_sees_a_hundredth_of_every_effect(space, order, effect, option
         assert unstable_directions(potential, frame) == frame.unstable_modes
 
 
+def test_loads_balance_with_tension_in_links_that_all_but_leave_them_free():
+    """Taut links in line turn by 1e-10 under a load of 2e-10 of their tension, which does all the work against it."""
+    scene, load = arch("plane-stress", 2, PrestrainPlan("right", 0.999, None)), 2e-9
+    taut = [replace(link, centreline=tuple((x, 0.0) for x, _ in link.centreline)) for link in scene.links[1:]]
+    joints = tuple(replace(joint, at=(joint.at[0], 0.0)) for joint in scene.joints)
+    forces = (ForcePlan("load", "left", (30.0, 0.0), (0.0, -1.0)),)
+    scene = replace(scene, links=(scene.links[0], *taut), joints=joints, forces=forces, samples=(load,), ratios=(1.0,))
+    built = build(scene)
+    (frame,) = built.curve(scene).frames
+    potential = Potential.of(scene, built.simulation)
+    found = check(potential, frame, 0.0)
+    assert found.scale > 1e9 * load and found.unstrained_work < THRESHOLDS.balanced
+    pulled = check(potential, replace(frame, force=1.01 * load), 0.0)
+    assert pulled.unstrained_work > 100.0 * THRESHOLDS.balanced
+
+
 @pytest.mark.parametrize("turn, flexible, joined", [(0.0, False, True), (0.1, False, False), (0.1, True, True)])
 def test_motors_take_rigid_links_where_they_can_be_joined(turn, flexible, joined):
     scene = arch("plane-stress", 2)

@@ -9,11 +9,21 @@ import pytest
 import fenicsmech as fm
 
 from . import designs, reach
-from .blueprint import Blueprint, ContactPlan, ForcePlan, JointPlan, LinkPlan, PlanePlan, SpringPlan, build
+from .blueprint import (
+    Blueprint,
+    CompliancePlan,
+    ContactPlan,
+    ForcePlan,
+    JointPlan,
+    LinkPlan,
+    PlanePlan,
+    SpringPlan,
+    build,
+)
 from .designs import UNMET
 from .potential import Potential
-from .reach import least_stretch
-from .reasons import _constant_forces, adrift, inverted, out_of_reach, overstrained, turned_back
+from .reach import beyond_chains, least_stretch
+from .reasons import _constant_forces, adrift, inverted, out_of_reach, overstrained, turned_back, unheard
 from .residual_check import check, fault
 from .scene_result import ROUNDED, SceneResult
 from .stability_check import stiffness_left
@@ -139,6 +149,24 @@ def test_reach_is_that_of_the_best_of_several_starts_and_of_none_that_did_not_co
     assert least_stretch(potential, still, below, 6.0) > 1.3
     monkeypatch.setattr(reach, "_EVALUATIONS", 1)
     assert np.isnan(least_stretch(potential, still, below, 6.0))
+
+
+def test_rigid_links_reach_no_farther_than_they_are_long_and_flexible_ones_and_slides_set_no_bound():
+    scene, built = hung(), build(hung())
+    (frame,) = built.curve(scene).frames
+    # the crank is 10 long, and drawn across the force
+    assert [beyond_chains(scene, travel) > 0.0 for travel in (-10.1, -9.9, 9.9, 10.1)] == [True, False, False, True]
+    for travel, excused in ((9.99, False), (10.01, True)):
+        there = replace(scene, samples=(travel,))
+        assert (out_of_reach(there, built, failed(frame)) is not None) == excused
+    # a rigid rod of length 20 from the crank's end to the ground at a height of 30, and a force halfway up
+    rigid = (*scene.links[:2], LinkPlan("strip"))
+    up = replace(scene, links=rigid, forces=(ForcePlan("load", "strip", (0.0, 20.0), (0.0, 1.0)),))
+    assert beyond_chains(up, 0.3) == pytest.approx(0.3 / 30.0)
+    loose = (replace(up, links=scene.links), replace(up, effects=tuple(CompliancePlan(name, 1e-3) for name in "AC")))
+    slides = tuple(replace(joint, kind="prismatic") if joint.name in "AC" else joint for joint in up.joints)
+    for other in (*loose, replace(up, joints=slides)):
+        assert beyond_chains(other, 1e3) == -np.inf
 
 
 def test_stiffness_is_compared_at_stable_equilibria_that_second_differences_confirm(raised):
@@ -293,3 +321,20 @@ def test_rounding_of_nodal_forces_grows_with_the_order_of_elements():
         potential = Potential.of(scene, build(scene).simulation)
         gains.append(potential.rounding(scene.links[1])[0] / np.sqrt(potential.mesh.nodes.size))
     assert 1.2 * gains[0] < gains[1] < 2.0 * gains[0]
+
+
+@pytest.mark.parametrize(("share", "hidden"), [(0.3, True), (3.0, False)])
+def test_a_force_is_hidden_only_below_the_rounding_of_one_nodal_force_and_where_motors_turn_links(share, hidden):
+    scene = slider()
+    (strip,) = scene.flexible
+    force = share * THRESHOLDS.unheard * strip.young * strip.depth * scene.length
+    scene = replace(scene, samples=(force,))
+    failure = SimpleNamespace(last=None, frames=(), problem="no equilibrium at force 1")
+    assert unheard(scene, build(scene), failure) is None
+    turned = replace(scene, motors=(SimpleNamespace(joint="S", position=0.0),))
+    assert (unheard(turned, build(scene), failure) is not None) == hidden
+    loads = SimpleNamespace(last=SimpleNamespace(state=SimpleNamespace(load_factor=0.5)), frames=())
+    motors = SimpleNamespace(last=None, frames=())
+    for before in (loads, motors):
+        before.problem = "the motors strain the links, and no equilibrium was found beyond 46.8% of their way"
+        assert unheard(turned, build(scene), before) is None

@@ -27,7 +27,7 @@ class Thresholds:
         rank: singular value over the largest below which motions count as free.
         frames: of a path that are checked.
         directions: at random, along which the potential must be stationary.
-        joined: gap over the mechanism's length, rad, above which rigid links cannot be joined.
+        joined: gap over the mechanism's length, rad, above which rigid links cannot be joined, or do not reach a point.
         immobile: travel of the force's point per unit motion of bodies at which it cannot be displaced.
         adrift: work of loads along a free translation, over loads times the velocity of what moves fastest, at which
             it has no bound.
@@ -40,6 +40,7 @@ class Thresholds:
         followed: most frames of a path that is to turn back.
         turned: what a curve has reached over where the path turns back, at least.
         drowned: stiffness of springs over that of the stiffest link at which rounding hides it.
+        unheard: force over the stiffest link's E b ℓ that rounding hides, of the mechanism's length ℓ.
         excused: share of the scenes that make sense that each excuse may let off.
         held: share of those in which joints and motors hold the point, which is exact.
         excused_together: share that all other excuses may let off.
@@ -84,6 +85,7 @@ class Thresholds:
     followed: int = 150
     turned: float = 0.9
     drowned: float = 1e-14
+    unheard: float = 1e-16
     excused: float = 0.03
     held: float = 0.12
     excused_together: float = 0.06

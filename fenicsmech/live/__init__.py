@@ -1,0 +1,60 @@
+"""The live page: a mechanism and its load–displacement curve in a browser, to be dragged.
+
+    python3 -m fenicsmech.live
+
+- ``project``: mechanism, curves, targets and design as plain JSON; ``schema``: what plain data may be
+- ``messages``: what page, server and solver process say to each other
+- ``session``: project, history, and what a gesture leads to
+- ``server``: static files and a WebSocket on 127.0.0.1; ``solver``: the process that computes, ended at any time
+- ``cancel``: equilibria that a new gesture ends at their next iteration
+- ``solid``: the process that solves in space; ``job``: runs it
+- ``build``: the simulation and the design problem of a project; ``script``: the Python script that does the same
+- ``stored``: first results for the next start, shown before the solver is up
+- ``describe``: the project of a script's design problem; ``export``: files of a project
+- ``page/``: the page itself, modules without a build step
+
+While a target is dragged the page shows the linear preview, from the last derivatives of the curve; when it rests, the
+solver follows, and every iterate is shown as it comes. The next gesture ends that at its next iteration.
+"""
+
+from fenicsmech.design import DesignProblem
+from fenicsmech.live.build import draw
+from fenicsmech.live.cancel import Cancellable, Cancelled
+from fenicsmech.live.describe import project_of
+from fenicsmech.live.export import export
+from fenicsmech.live.job import Job
+from fenicsmech.live.messages import LARGEST, PER_SECOND, read_message
+from fenicsmech.live.project import (
+    FORMAT,
+    Project,
+    edited,
+    example,
+    example_names,
+    forces_of,
+    load_project,
+    read_project,
+)
+from fenicsmech.live.schema import Refused
+from fenicsmech.live.script import script
+from fenicsmech.live.server import Server, ServerOptions, serve
+from fenicsmech.live.session import Answer, Session
+from fenicsmech.live.solid import solve_solid
+from fenicsmech.live.solver import Solver
+
+
+def live(problem: DesignProblem | Project, *, port: int = 0, browse: bool = True) -> None:
+    """Opens the live page of a design problem in a browser, and serves it until interrupted.
+
+    The page is at 127.0.0.1, its address has a random token. Problems in 3D are shown in plane stress.
+
+    Args:
+        problem: of links that are strips or polygons, with targets on load–displacement curves; or a project of the
+            page.
+        port: of 127.0.0.1; a free one by default.
+        browse: whether a browser is opened; otherwise the address is printed alone.
+
+    Raises:
+        DescriptionError: a part of the problem is nothing that the page knows, or aiohttp is missing.
+    """
+    project = project_of(problem) if isinstance(problem, DesignProblem) else problem
+    serve(project, options=ServerOptions(port=port), browse=browse)

@@ -1,0 +1,103 @@
+"""A job beside the solver: a process that gets one task, tells its events, and is ended at any time."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+_LONGEST = 2**27  # bytes of an event
+
+
+async def events(process: asyncio.subprocess.Process) -> AsyncIterator[dict[str, Any]]:
+    """The events that a process writes, a line each; one that writes something else is ended."""
+    assert process.stdout is not None, "it is a pipe"
+    try:
+        while line := await process.stdout.readline():
+            yield json.loads(line)
+    except ValueError:  # a line that is cut, or longer than the limit of the pipe
+        with suppress(ProcessLookupError):
+            process.kill()
+
+
+class Job:
+    """One process at a time.
+
+    Args:
+        command: that reads a task as JSON from standard input, and writes events to standard output, a line each.
+        receive: called with each event.
+
+    Attributes:
+        last: the last event, for pages that are opened later; None before the first, and when it is forgotten.
+    """
+
+    def __init__(self, command: tuple[str, ...], receive: Callable[[Mapping[str, Any]], None]) -> None:
+        self._command, self._receive = command, receive
+        self._work: asyncio.Task[None] | None = None
+        self._changing = asyncio.Lock()  # of two that start at once, the later one lasts
+        self.last: Mapping[str, Any] | None = None
+
+    async def start(self, task: Mapping[str, Any]) -> None:
+        """Begins a task; the one before is ended."""
+        async with self._changing:
+            await self._end()
+            self._work = asyncio.create_task(self._run(task))
+
+    async def stop(self) -> bool:
+        """Ends the task at work; whether there was one."""
+        async with self._changing:
+            return await self._end()
+
+    async def forget(self) -> None:
+        """Ends the task at work, and forgets what it has told: its subject is another one."""
+        async with self._changing:
+            ended, self.last = await self._end(), None
+        if ended:
+            self._receive({"event": "solid", "state": "cancelled"})
+
+    async def _end(self) -> bool:
+        work, self._work = self._work, None
+        if work is None or work.done():
+            return False
+        work.cancel()
+        with suppress(asyncio.CancelledError):
+            await work
+        return True
+
+    def tell(self, event: Mapping[str, Any]) -> None:
+        """Sends an event on."""
+        self.last = event
+        self._receive(event)
+
+    async def _run(self, task: Mapping[str, Any]) -> None:
+        try:
+            problem = await self._problem(task)
+        except Exception as error:  # nobody waits for this: it would end silently
+            problem = f"{type(error).__name__}: {error}"
+        if problem is not None:
+            remedy = "Choose larger elements or fewer frames if memory was short, and solve again"
+            self.tell({"event": "solid", "state": "failed", "part": "solid", "problem": problem, "remedy": remedy})
+
+    async def _problem(self, task: Mapping[str, Any]) -> str | None:
+        """Runs the process; why it ended without telling its end, or None."""
+        pipe, none = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
+        process = await asyncio.create_subprocess_exec(
+            *self._command, stdin=pipe, stdout=pipe, stderr=none, limit=_LONGEST
+        )
+        try:
+            assert process.stdin is not None, "it is a pipe"
+            with suppress(ConnectionError):  # the process has just died
+                process.stdin.write(json.dumps(task).encode())
+                await process.stdin.drain()
+            process.stdin.close()
+            ended = False
+            async for event in events(process):
+                ended = event["state"] in ("solved", "failed")
+                self.tell(event)
+            return None if ended else f"its process ended with {await process.wait()}"
+        finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()

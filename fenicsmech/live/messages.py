@@ -1,0 +1,131 @@
+"""Messages between the page, the server and the solver process: plain data as JSON, one schema each.
+
+Page to server, one WebSocket message each, at most ``LARGEST`` bytes. ``kind`` is one of
+
+    edit     changes    of the project: {kind: set | insert | remove, path: [keys and indices], value}
+             settled    false while a gesture lasts: it is solved, and joined with what follows into one step of undo
+             fit        optional; whether the design follows its targets now; by default as the project's "fit" says,
+                        and not where the changes set the design itself
+    cancel              of a gesture that lasts: the project as it was before it; nothing if none lasts
+    undo, redo, reset   steps of the history; reset goes back to what was opened last
+    open     project    replaces the project
+    example  name       replaces it by one that comes with the page
+    push     curve, force   the equilibrium under a force that the pointer exerts; the project stays
+    release             the pointer exerts none; the solver goes on with what the push had interrupted
+    fit                 the design follows its targets once
+    stop                ends what the solver does
+    solve solid  curve  solves a curve in space, in a process of its own beside the solver
+    stop solid          ends that
+
+Server to page, each with ``heard``, how many messages of the page came before: an event that is older than the page's
+last edit knows nothing of it. ``event`` is one of
+
+    project     project, undo and redo (whether there are steps), opened (how many projects were), examples, materials,
+                    most: {curves, targets}
+    first       curves of the project as it was opened: [{force, positions, others, points: [[displacement, force]]}]
+    solver      state: starting, ready, busy, idle, restarted or failed; since: seconds
+    refused     place, problem: of the last message, which changed nothing
+    solid       state: solving (done, of: frames), failed (part, problem, remedy), cancelled, or solved with
+                    curve, project (of the solid), remarks, failed, seconds, errors (of displacements; null if failed),
+                    triangles (base64 of uint32, of the surface), and points, one a frame:
+                        force, displacement, stable, snapped, peak {value, error, point (number)},
+                        places (base64 of float32, [x, y, z] a point), von_mises (likewise, one a point),
+                        rigid [[[x, y]] a rigid link]
+    and the results of the solver below, of the present task alone
+
+Server to solver, a line each: {task: number, kind: solve | push, project, fit, curve, force}.
+
+Solver to server, a line each, with the number of their task:
+
+    ready, began
+    mesh      flexible: [{name, triangles, loops}], rigid: [{name, fixed, width}], welded: [bool]
+    iterate   number, design, values (corrected, of all targets), misfits (relative, of all targets)
+    curve     curve, iterate (null of the final one), remarks, failed, and points, one a frame:
+                  force, displacement, stable, snapped, stress (largest von Mises),
+                  nodes [[[x, y]] a flexible link], von_mises [[one a node] a flexible link],
+                  rigid [[[x, y]] a rigid link: its joints, forces and outputs], pins [[x, y]]
+    errors    curve, errors: estimated discretisation errors of the displacements of its points, to be added; peak of
+                  the stress at its end, outside of singular places: {value, error, link}, null if there is none
+    fitted    design, misfits, reason, converged, iterations
+    linear    the linear preview at a design, Q(p + s) ≈ Q + e + J s, R ≈ ∂R/∂p s + ½ sᵀ ∂²R/∂p² s:
+                  design, lengths (typical change of each parameter), curves: [{forces, values, errors, jacobian}],
+                  gradient, curvature, active (bounds that hold it back), whole (not cut where a curve snaps),
+                  links: [{name, controls [[[x, y, δ], tangent]], entries (parameter of each, −1 none), thickness}]
+    pushed    curve, point
+    done      seconds
+    cancelled
+    failed    part, problem, remedy
+
+A design is {offsets: parameters less those drawn, handles: positions of handles on the links}.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from fenicsmech.live.project import MOST_CURVES
+from fenicsmech.live.schema import FLAG, Anything, ByKind, Choice, Many, Number, Record, Refused, Schema, Text
+
+LARGEST = 1_000_000
+"""Bytes of a message from the page."""
+
+PER_SECOND = 120
+"""Messages of a page in a second, above the rate of its screen; more are refused."""
+
+
+class _Step(Schema):
+    """A key or an index."""
+
+    def check(self, value, place=""):
+        (Text(40) if isinstance(value, str) else Number(0, 10_000, whole=True)).check(value, place)
+
+
+_PATH = Many(_Step(), 1, 8)
+_CHANGE = ByKind(
+    {
+        "set": Record({"path": _PATH, "value": Anything()}),
+        "insert": Record({"path": _PATH, "value": Anything()}),
+        "remove": Record({"path": _PATH}),
+    }
+)
+
+_CURVE = Number(0, MOST_CURVES - 1, whole=True)
+
+PAGE = ByKind(
+    {
+        "edit": Record({"changes": Many(_CHANGE, 1, 60), "settled": FLAG}, {"fit": FLAG}),
+        "cancel": Record({}),
+        "undo": Record({}),
+        "redo": Record({}),
+        "reset": Record({}),
+        "open": Record({"project": Anything()}),
+        "example": Record({"name": Text(60)}),
+        "push": Record({"curve": _CURVE, "force": Number(-1e6, 1e6)}),
+        "release": Record({}),
+        "fit": Record({}),
+        "stop": Record({}),
+        "solve solid": Record({"curve": _CURVE}),
+        "stop solid": Record({}),
+    }
+)
+"""Messages from the page."""
+
+EXPORTS = Choice(("project", "script", "step", "stl", "dxf", "png", "animation"))
+"""Files that the page downloads."""
+
+
+def read_message(text: str | bytes) -> dict[str, Any]:
+    """A message from the page.
+
+    Raises:
+        Refused: it is none.
+    """
+    if len(text) > LARGEST:
+        raise Refused("", f"a message of {len(text)} bytes, not at most {LARGEST}")
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        raise Refused("", "not JSON") from None
+    PAGE.check(message)
+    return message

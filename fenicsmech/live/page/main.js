@@ -1,0 +1,369 @@
+// The page: one store of what the server has sent, the two pictures, and the controls.
+
+import { Chart } from "./chart.js";
+import { Handles } from "./handles.js";
+import { connect } from "./net.js";
+import { step } from "./preview.js";
+import { Side } from "./side.js";
+import { Solid } from "./solid.js";
+import { figure } from "./svg.js";
+import { View } from "./view.js";
+
+const $ = (id) => document.getElementById(id);
+
+const store = {
+  project: null, mesh: null, curves: {}, errors: {}, peaks: {}, linear: null, misfits: null, first: [],
+  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], opened: 0, added: null,
+
+  curve() { return this.curves[this.shown]; },
+  // The mesh of what is drawn: another curve may still be that of an earlier shape.
+  drawnMesh() { const own = this.curve(); return !this.pushed && own ? own.mesh : this.mesh; },
+  // The shown curve as it was when the project was opened; null if its load is another one.
+  before() {
+    const curve = this.project.curves[this.shown], key = (force, { positions, others }) => JSON.stringify([force, positions, others]);
+    const now = key(this.project.forces.find((own) => own.name === curve.force), curve);
+    return this.first.find((own) => key(own.force, own) === now) || null;
+  },
+  // What a preview is a step from.
+  base() { return handles.held ? handles.held.linear : this.linear; },
+  // The targets, with the one that is dragged where the pointer has it.
+  targets() {
+    return this.project.targets.map((target, k) => this.drag && this.drag.index === k ? this.drag.target : target);
+  },
+  preview() {
+    this.previewed = this.linear && this.linear.curves.length === this.project.curves.length
+      ? step(this.linear, { ...this.project, targets: this.targets() }) : null;
+  },
+  edit(changes, { settled = true, fit } = {}) {
+    const message = { kind: "edit", changes, settled };
+    if (fit !== undefined) message.fit = fit;
+    if (send(message)) apply(this.project, changes);
+  },
+  // Whether what was solved in 3D belongs to another design.
+  stale() {
+    const key = (own) => JSON.stringify([own.links, own.joints, own.forces, own.effects, own.design, own.curves[this.solid.curve], own.simulation]);
+    return key(this.solid.project) !== key(this.project);
+  },
+  send(message) { return send(message); },
+  tell(text, error) { tell(text, error); },
+  show() { show(); },
+  drawCurve() { chart.preview(); },
+  listTargets() { listTargets(); },
+};
+
+const HINTS = {
+  move: "Drag a target ◆ on the curve, or choose Stiffer: the link changes its shape to follow. Or push the mechanism.",
+  solid: "Turn the solid with the pointer or the arrow keys. Solve in 3D to see how far plane stress is from it.",
+  shape: "Drag control points ■, slopes ○ and thicknesses ◆: the dashed curve shows where it leads. Joints ● and the force ▲ are solved where they rest.",
+};
+
+const chart = new Chart($("chart"), store), view = new View($("view"), store);
+const handles = new Handles(view, store), side = new Side($("side"), store);
+const solid = new Solid($("solid"), store, view);
+let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, phase = 0;
+
+const receivers = {
+  project({ project, undo, redo, ...more }) {
+    const other = store.opened !== more.opened;
+    store.project = project;
+    Object.assign(store, more);
+    if (other) { store.curves = {}; store.errors = {}; store.peaks = {}; store.linear = null; store.solid = null; view.forced = true; }
+    if (chart.held && !project.targets[chart.held.index]) { chart.held.sent = false; chart.release(true); } // it was removed elsewhere
+    const added = project.curves.findIndex((own) => own.name === store.added);
+    if (added >= 0) { store.shown = added; store.added = null; }
+    store.shown = Math.min(store.shown, project.curves.length - 1);
+    const forces = JSON.stringify(project.curves.map((own) => [own.force, own.positions]));
+    if (store.forces !== forces) { store.forces = forces; store.linear = null; store.previewed = null; }
+    for (const number of Object.keys(store.curves)) if (number >= project.curves.length) delete store.curves[number];
+    $("name").textContent = project.name;
+    $("add-curve").disabled = project.curves.length >= store.most.curves;
+    $("add").disabled = project.targets.length >= store.most.targets;
+    $("undo").disabled = !undo; $("redo").disabled = !redo;
+    tabs(); listTargets(); chart.draw(); side.draw();
+    if (!handles.held) view.draw();
+  },
+  first({ curves }) { store.first = curves; if (store.project) { chart.draw(); stiffness(); } },
+  solver(event) {
+    const { state, seconds } = event;
+    store.busy = state === "busy" || state === "starting";
+    $("state").classList.toggle("busy", store.busy);
+    if (state === "busy") { store.iteration = null; tell(null); }
+    const words = { starting: "Starting…", busy: "Solving…", failed: "The solver ended again and again. Undo the last change." };
+    $("state").textContent = words[state] || (seconds ? `Solved in ${seconds.toFixed(1)} s` : "Ready");
+    document.body.dataset.solver = state;
+    $("fit").textContent = store.busy ? "Stop" : "Fit";
+    if (!store.busy) store.waiting.splice(0).forEach((go) => go());
+    $("fit").title = store.busy ? "Stop solving" : "Let the shape follow the targets once more";
+  },
+  refused({ place, problem }) { store.added = null; tell(`${place ? `${place}: ` : ""}${problem}`, true); },
+  mesh(event) { store.mesh = event; },
+  iterate({ number, design, misfits }) {
+    store.project.design = design;
+    store.misfits = misfits;
+    const worst = Math.max(0, ...misfits.map(Math.abs));
+    $("state").textContent = `Solving… step ${number}, targets missed by ${figure(100 * worst, 2)} %`;
+    listTargets();
+  },
+  curve(event) {
+    store.curves[event.curve] = { ...event, mesh: store.mesh };
+    delete store.errors[event.curve]; delete store.peaks[event.curve];
+    store.pushed = null;
+    if (!store.drag && !handles.held) store.previewed = null;
+    store.stressTop = Math.max(...Object.values(store.curves).flatMap((own) => own.points.map((point) => point.stress)), 1e-9);
+    $("scale-high").textContent = `${figure(store.stressTop)} MPa`;
+    const { failed, remarks } = event;
+    if (event.iterate === null) document.body.dataset.curves = Number(document.body.dataset.curves || 0) + 1;
+    if (failed) tell(`${failed.part}: ${failed.problem}. ${failed.remedy}.`, true);
+    remarks.forEach((remark) => tell(remark));
+    view.fit(); show(); chart.draw(); listTargets();
+  },
+  errors({ curve, errors, peak }) { store.errors[curve] = errors; store.peaks[curve] = peak; chart.draw(); listTargets(); },
+  fitted({ misfits, reason, converged, design }) {
+    store.project.design = design;
+    store.misfits = misfits;
+    const missed = misfits.some((own) => Math.abs(own) > 0.01);
+    if (missed || !converged) tell(`Targets are missed by up to ${figure(100 * Math.max(...misfits.map(Math.abs)), 2)} %: ${reason}. Relax a target, widen the thicknesses, or move a joint.`, true);
+    listTargets();
+  },
+  linear(event) {
+    store.linear = event;
+    store.active = event.active;
+    if (!event.whole) tell("The linear preview ends where a curve snaps, ends or is unstable.");
+    if (event.active.length) tell(`Held back by ${event.active.join(", ")}. Widen these bounds, or relax a target.`);
+    if (!store.drag && !handles.held) { store.previewed = null; chart.preview(); }
+    view.draw();
+  },
+  solid(event) {
+    store.solving = event.state === "solving";
+    $("progress").hidden = !store.solving;
+    $("solve-solid").textContent = store.solving ? "Stop" : "Solve in 3D";
+    if (store.solving) $("progress").value = event.done / event.of;
+    if (event.state === "failed") tell(`In 3D: ${event.part}: ${event.problem}. ${event.remedy}.`, true);
+    if (event.state === "solved") {
+      store.solid = event;
+      if (event.failed) tell(`In 3D: ${event.failed.part}: ${event.failed.problem}. ${event.failed.remedy}.`, true);
+      event.remarks.forEach((remark) => tell(`In 3D: ${remark}`));
+    }
+    $("solid-state").textContent = { solving: `${event.done} of ${event.of} frames`, failed: "Failed, see below", cancelled: "Stopped" }[event.state] || "";
+    document.body.dataset.solid = event.state;
+    chart.draw(); show();
+  },
+  pushed({ point, curve }) { if (curve === store.shown) handles.answered(point); },
+  failed({ part, problem, remedy }) { handles.failed(); tell(`${part}: ${problem}. ${remedy}.`, true); },
+  done({ task }) {
+    const own = store.curve();
+    if (!own || own.task !== task || (store.linear && store.linear.task === task)) return;
+    store.linear = null; // it belongs to another design
+    if (store.project.links.some((link) => link.design)) tell("No linear preview: a curve snaps or ends early. Make its largest force smaller for one.");
+  },
+  cancelled() { handles.failed(); },
+};
+
+const transmit = connect(
+  (event) => { const receive = receivers[event.event]; if (receive) receive(event); },
+  () => { $("state").textContent = "Not connected. Is the program still running?"; },
+);
+
+// A message to the server.
+function send(message) {
+  if (message.kind !== "edit" || message.settled) chart.settleNow();
+  const sent = transmit(message);
+  if (sent) document.body.dataset.solver = "asked"; // until its answer
+  else tell("Not connected: this change was not made. Is the program still running?", true);
+  return sent;
+}
+
+// Sets values in the project at once, as the server will answer.
+function apply(project, changes) {
+  for (const { kind, path, value } of changes) {
+    const at = kind === "set" ? path.slice(0, -1).reduce((own, step) => own && own[step], project) : null;
+    if (at) at[path.at(-1)] = structuredClone(value);
+  }
+}
+
+// A message to the user; null clears them.
+function tell(text, error = false) {
+  if (text === null) { $("told").replaceChildren(); return; }
+  const item = document.createElement("li");
+  item.textContent = text;
+  if (error) item.className = "error";
+  if ([...$("told").children].some((own) => own.textContent === text)) return;
+  $("told").append(item);
+}
+
+function tabs() {
+  const { curves } = store.project;
+  $("tabs").replaceChildren(...(curves.length < 2 ? [] : curves.map((curve, k) => {
+    const tab = document.createElement("button");
+    tab.textContent = curve.name;
+    tab.setAttribute("role", "tab");
+    tab.setAttribute("aria-selected", k === store.shown);
+    tab.onclick = () => { store.shown = k; store.pushed = null; tabs(); chart.draw(); show(); side.draw(); listTargets(); };
+    return tab;
+  })));
+}
+
+// Displacement of the shown design at a force, with its estimated error, interpolated between frames.
+function reached(target) {
+  const own = store.curves[target.curve], errors = store.errors[target.curve] || [];
+  if (!own) return null;
+  for (let k = 0; k + 1 < own.points.length; k++) {
+    const a = own.points[k], b = own.points[k + 1], span = b.force - a.force;
+    const t = span ? (target.force - a.force) / span : -1;
+    if (t >= -1e-9 && t <= 1 + 1e-9) {
+      const error = (errors[k] || 0) * (1 - t) + (errors[k + 1] || 0) * t;
+      return { value: a.displacement + t * (b.displacement - a.displacement) + error, error };
+    }
+  }
+  return null;
+}
+
+// The value at x of a line through points [x, value]; null beyond them.
+function between(points, x) {
+  for (let k = 0; k + 1 < points.length; k++) {
+    const [[a, p], [b, q]] = [points[k], points[k + 1]], t = (x - a) / (b - a);
+    if (t >= -1e-9 && t <= 1 + 1e-9) return p + t * (q - p);
+  }
+  return null;
+}
+
+// The secant stiffness at the largest force of the shown curve, and beside what was opened.
+function stiffness() {
+  const own = store.curve(), errors = store.errors[store.shown] || [];
+  if (!own || own.points.length < 2) { $("stiffness-now").textContent = ""; return; }
+  const end = own.points.at(-1), value = end.displacement + (errors[own.points.length - 1] || 0), now = end.force / value;
+  const first = store.before(), then = first && between(first.points.map(([displacement, force]) => [force, displacement]), end.force);
+  const change = then && value && store.errors[store.shown] ? 100 * (then / value - 1) : 0; // both with their errors
+  const more = Math.abs(change) > 0.3 ? `, ${figure(Math.abs(change), 2)} % ${change > 0 ? "stiffer" : "softer"} than at first` : "";
+  const peak = store.peaks[store.shown], stress = peak ? `; stress up to ${figure(peak.value)} ± ${figure(peak.error, 1)} MPa` : "";
+  $("stiffness-now").textContent = `${figure(now)} N/mm at ${figure(end.force)} N${more}${stress}`;
+}
+
+function listTargets() {
+  stiffness();
+  const targets = store.targets(), kept = [...$("targets").children]; // a button that is being pressed stays
+  targets.forEach((target, k) => {
+    if (target.curve !== store.shown) return;
+    const item = kept.shift() || document.createElement("li");
+    if (!item.children.length) {
+      item.append(document.createElement("span"), document.createElement("span"), Object.assign(document.createElement("button"), { textContent: "×", title: "Remove this target (Delete)" }));
+      $("targets").append(item);
+    }
+    const [text, mark, remove] = item.children;
+    mark.textContent = mark.className = "";
+    delete item.dataset.miss;
+    text.textContent = `◆ ${figure(target.displacement, 4)} mm at ${figure(target.force)} N`;
+    const now = reached(target);
+    if (now) {
+      const miss = (now.value - target.displacement) / Math.abs(target.displacement);
+      const error = Math.abs(now.error) > 0 ? ` ± ${figure(Math.abs(now.error), 1)}` : "";
+      mark.textContent = `reached ${figure(now.value, 4)}${error} mm (${miss < 0 ? "−" : "+"}${figure(100 * Math.abs(miss), 2)} %)`;
+      mark.className = Math.abs(miss) <= 0.01 ? "met" : "missed";
+      item.dataset.miss = miss;
+    }
+    remove.onclick = () => store.edit([{ kind: "remove", path: ["targets", k] }]);
+    remove.setAttribute("aria-label", `Remove target ${k + 1}`);
+  });
+  kept.forEach((item) => item.remove());
+}
+
+// -- controls ---
+
+for (const kind of ["undo", "redo", "reset"]) $(kind).onclick = () => send({ kind });
+$("fit").onclick = () => send({ kind: store.busy ? "stop" : "fit" });
+$("add").onclick = () => {
+  const own = store.curve(), points = own ? own.points : [];
+  const at = points[Math.max(1, Math.round(store.load * (points.length - 1)))];
+  if (!at) return;
+  store.edit([{ kind: "insert", path: ["targets", store.project.targets.length],
+    value: { curve: store.shown, force: at.force, displacement: Number(at.displacement.toPrecision(4)) || 0.1, weight: 1 } }]);
+};
+// All targets of the shown curve at displacements that are a factor smaller; without targets there is one at its end.
+function stiffen(factor) {
+  const { project, shown } = store, own = store.curve(), changes = [], mine = project.targets.filter((target) => target.curve === shown);
+  project.targets.forEach((target, k) => {
+    if (target.curve === shown) changes.push({ kind: "set", path: ["targets", k, "displacement"], value: Number((target.displacement / factor).toPrecision(5)) });
+  });
+  const end = own && own.points.at(-1);
+  if (!mine.length && end && end.force) changes.push({ kind: "insert", path: ["targets", project.targets.length],
+    value: { curve: shown, force: end.force, displacement: Number((end.displacement / factor).toPrecision(5)), weight: 1 } });
+  if (changes.length) store.edit(changes, { fit: true });
+}
+const share = () => Math.min(Math.max(Number($("by").value) || 20, 1), 90) / 100;
+$("stiffer").onclick = () => stiffen(1 + share());
+$("softer").onclick = () => stiffen(1 - share());
+
+// A curve like the shown one, of a force of its own, turned by 45°: its point and direction are dragged in Shape.
+$("add-curve").onclick = () => {
+  const { curves, forces } = store.project, shown = curves[store.shown], like = forces.find((own) => own.name === shown.force);
+  const fresh = (stem, taken) => { let k = taken.length + 1; while (taken.some((own) => own.name === `${stem} ${k}`)) k++; return `${stem} ${k}`; };
+  const name = fresh("force", forces), curve = fresh("curve", curves), [a, b] = like.direction;
+  store.added = curve; // it is shown when the server has it
+  store.edit([{ kind: "insert", path: ["forces", forces.length], value: { ...like, name, direction: [0.7 * (a - b), 0.7 * (a + b)].map((part) => Number(part.toFixed(4))) } },
+    { kind: "insert", path: ["curves", curves.length], value: { ...shown, name: curve, force: name, others: {} } }]);
+  $("mode-shape").click();
+  $("hint").textContent = `Drag the point ▲ of ${name} and the dot that gives its direction, or change them beside the pictures.`;
+};
+$("play").onclick = () => { playing = !playing; showPlaying(); };
+$("load").oninput = () => { playing = false; store.load = Number($("load").value); showPlaying(); show(); };
+document.addEventListener("keydown", (event) => {
+  if (event.target.matches("input, select, textarea") || chart.held || handles.held) return;
+  const command = event.ctrlKey || event.metaKey;
+  if (command && event.key.toLowerCase() === "z") { event.preventDefault(); send({ kind: event.shiftKey ? "redo" : "undo" }); }
+  else if (command && event.key.toLowerCase() === "y") { event.preventDefault(); send({ kind: "redo" }); }
+  else if (event.key === " " && !event.target.matches("button")) { event.preventDefault(); $("play").click(); }
+});
+
+$("solve-solid").onclick = () => send(store.solving ? { kind: "stop solid" } : { kind: "solve solid", curve: store.shown });
+
+for (const mode of ["move", "shape", "solid"]) $(`mode-${mode}`).onclick = () => {
+  store.mode = mode;
+  for (const own of ["move", "shape", "solid"]) $(`mode-${own}`).setAttribute("aria-pressed", own === mode);
+  $("view").dataset.mode = document.body.dataset.mode = mode;
+  $("scale-high").textContent = `${figure(store.stressTop)} MPa`;
+  $("hint").textContent = HINTS[mode];
+  show();
+};
+
+function showPlaying() {
+  $("play").setAttribute("aria-pressed", playing);
+  $("play").textContent = playing ? "Pause" : "Play";
+}
+
+function show() {
+  if (store.mode === "solid") solid.draw(); else view.draw();
+  chart.mark(store.load);
+  const state = store.mode === "solid" ? solid.now : view.now;
+  compareSolid();
+  if (!state) return;
+  $("at").textContent = `${figure(state.force, 2)} N, ${figure(state.displacement, 3)} mm`;
+}
+
+// What 3D says beside plane stress, at the largest force that both reach.
+function compareSolid() {
+  const { solid: own } = store;
+  if (store.mode !== "solid" || store.solving || !own || !own.points.length || own.curve !== store.shown) return;
+  const end = own.points.at(-1), now = reached({ curve: own.curve, force: end.force }), error = own.errors ? own.errors.at(-1) : 0;
+  const value = end.displacement + error, less = now && value ? (now.value - value) / Math.abs(value) : 0;
+  const text = `${figure(value, 4)}${error ? ` ± ${figure(Math.abs(error), 1)}` : ""} mm at ${figure(end.force)} N`;
+  $("solid-state").textContent = store.stale() ? `${text}, of an earlier shape` : `${text}${now ? `; plane: ${less < 0 ? "−" : "+"}${figure(100 * Math.abs(less), 2)} %` : ""}`;
+}
+
+// The animation: loads the mechanism and unloads it, eased at the ends.
+let last = performance.now(), held = null;
+function animate(now) {
+  requestAnimationFrame(animate);
+  if (store.busy && now - last < 50) return; // the solver shares the processors
+  const passed = Math.min(now - last, 100);
+  last = now;
+  if (playing && store.mesh && store.curve() && !document.hidden && store.mode !== "shape" && !store.pushing && !store.drag) {
+    phase = (phase + passed / 4200) % 1;
+    store.load = 0.5 - 0.5 * Math.cos(2 * Math.PI * phase);
+    $("load").value = store.load;
+    show();
+  } else if (store.drag && store.drag !== held) view.draw(); // at rest
+  held = store.drag;
+}
+showPlaying();
+requestAnimationFrame(animate);
+window.live = { store, solid, chart, view, handles, send };

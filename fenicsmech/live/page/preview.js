@@ -1,0 +1,97 @@
+// The linear preview: Q(p + s) ≈ Q + e + J s near the last solved design, and the Gauss–Newton step s for moved targets
+//
+//   min over s   Σ ½ w (Q + e + J s − wanted)² / scale² + gᵀ s + ½ sᵀ H s + ½ μ |s / ℓ|²,   s within bounds of thickness.
+
+import { dot, solve } from "./algebra.js";
+
+const DAMPING = 1e-4;
+
+// Value and derivatives of a curve at a force between those of its frames.
+function row(curve, force, size) {
+  const forces = [0, ...curve.forces], k = forces.findIndex((f) => Math.abs(f) >= Math.abs(force) - 1e-12);
+  const at = (j) => j === 0 ? { value: 0, slopes: new Array(size).fill(0) }
+    : { value: curve.values[j - 1] + curve.errors[j - 1], slopes: curve.jacobian[j - 1] };
+  const last = forces.length - 1, high = k < 0 ? last : Math.max(k, 1), low = high - 1;
+  const t = (force - forces[low]) / (forces[high] - forces[low]), a = at(low), b = at(high);
+  return { value: a.value + t * (b.value - a.value), slopes: a.slopes.map((slope, j) => slope + t * (b.slopes[j] - slope)) };
+}
+
+// Least and largest s of each parameter: control points keep their thickness within its bounds.
+function bounds(linear, project) {
+  const low = linear.lengths.map(() => -Infinity), high = linear.lengths.map(() => Infinity);
+  for (const link of linear.links) {
+    const own = project.links.find((other) => other.name === link.name);
+    const range = own && own.design && own.design.thickness;
+    if (!range || !link.thickness) continue;
+    link.entries.forEach((point, k) => {
+      const entry = point[0][2], delta = link.controls[k][0][2];
+      if (entry < 0) return;
+      low[entry] = Math.min(0, range[0] / link.thickness - delta);
+      high[entry] = Math.max(0, range[1] / link.thickness - delta);
+    });
+  }
+  return [low, high];
+}
+
+// The step for the targets of a project.
+export function step(linear, project) {
+  const n = linear.lengths.length, largest = Math.max(...project.targets.map((t) => Math.abs(t.displacement)), 1e-9);
+  const A = linear.curvature.map((line, i) => line.map((value, j) => value + (i === j ? DAMPING / linear.lengths[i] ** 2 : 0)));
+  const b = linear.gradient.map((value) => -value);
+  for (const target of project.targets) {
+    const { value, slopes } = row(linear.curves[target.curve], target.force, n);
+    const weight = target.weight / Math.max(Math.abs(target.displacement), 0.1 * largest) ** 2;
+    for (let i = 0; i < n; i++) {
+      b[i] += weight * slopes[i] * (target.displacement - value);
+      for (let j = 0; j < n; j++) A[i][j] += weight * slopes[i] * slopes[j];
+    }
+  }
+  const [low, high] = bounds(linear, project), held = new Map();
+  for (let round = 0; round < 6; round++) {
+    const free = [...Array(n).keys()].filter((k) => !held.has(k));
+    const right = free.map((i) => b[i] - [...held].reduce((sum, [j, value]) => sum + A[i][j] * value, 0));
+    const x = solve(free.map((i) => free.map((j) => A[i][j])), right);
+    if (!x) return null;
+    const beyond = free.filter((k, i) => x[i] < low[k] || x[i] > high[k]);
+    if (!beyond.length || round === 5) {
+      const s = new Array(n).fill(0);
+      free.forEach((k, i) => { s[k] = Math.min(Math.max(x[i], low[k]), high[k]); });
+      held.forEach((value, k) => { s[k] = value; });
+      return s;
+    }
+    beyond.forEach((k) => held.set(k, x[free.indexOf(k)] < low[k] ? low[k] : high[k]));
+  }
+  return null;
+}
+
+// Displacements of a curve's frames after a step, from zero force on, as [displacement, force].
+export function curveAfter(linear, number, s) {
+  const own = linear.curves[number];
+  return [[0, 0], ...own.forces.map((force, k) => [own.values[k] + own.errors[k] + dot(own.jacobian[k], s), force])];
+}
+
+// Control points of a link after a step.
+export function controlsAfter(link, s) {
+  return link.controls.map((point, k) => point.map((part, m) => part.map((value, a) => {
+    const entry = link.entries[k][m][a];
+    return entry < 0 ? value : value + s[entry];
+  })));
+}
+
+// The outline of a link from its control points: centreline and half of its thickness to both sides.
+export function outline(controls, thickness, pieces = 24) {
+  const left = [], right = [];
+  for (let k = 0; k + 1 < controls.length; k++) {
+    const [P, M] = controls[k], [Q, N] = controls[k + 1];
+    for (let i = k ? 1 : 0; i <= pieces; i++) {
+      const t = i / pieces, h = [1 - 3 * t * t + 2 * t ** 3, t - 2 * t * t + t ** 3, 3 * t * t - 2 * t ** 3, t ** 3 - t * t];
+      const g = [-6 * t + 6 * t * t, 1 - 4 * t + 3 * t * t, 6 * t - 6 * t * t, 3 * t * t - 2 * t];
+      const at = [0, 1, 2].map((a) => h[0] * P[a] + h[1] * M[a] + h[2] * Q[a] + h[3] * N[a]);
+      const along = [0, 1].map((a) => g[0] * P[a] + g[1] * M[a] + g[2] * Q[a] + g[3] * N[a]);
+      const half = 0.5 * thickness * at[2] / (Math.hypot(...along) || 1);
+      left.push([at[0] - half * along[1], at[1] + half * along[0]]);
+      right.push([at[0] + half * along[1], at[1] - half * along[0]]);
+    }
+  }
+  return [...left, ...right.reverse()];
+}

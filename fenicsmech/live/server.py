@@ -1,0 +1,576 @@
+"""The server of the live page: static files and a WebSocket on 127.0.0.1, in front of a solver process.
+
+Addresses begin with a random token. Requests with another Host, and WebSockets with another Origin, are refused: no
+page of another site gets anything, not by a name that it makes point to this machine either. The browser is opened by
+an address without the token, which leads to the page once. The page has no paths of the disk. The solver process is
+started again when it dies, with the last task; it gets the whole project each time. A page that is opened before the
+solver is up has the results that an earlier start stored (``stored``).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import secrets
+import sys
+import webbrowser
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from fenicsmech.errors import DescriptionError
+from fenicsmech.live.job import Job, events
+from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
+from fenicsmech.live.project import MOST_CURVES, MOST_TARGETS, Project, example_names, materials
+from fenicsmech.live.schema import Refused
+from fenicsmech.live.script import script
+from fenicsmech.live.session import Session
+from fenicsmech.live.stored import StoredResults, user_cache
+from fenicsmech.log import logger
+
+if TYPE_CHECKING:
+    from aiohttp import web
+
+    Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+_log = logger(__name__)
+PAGE = Path(__file__).parent / "page"
+MOST_WAITING = 2**26  # characters for a page that does not read; a solid has some 2**25
+
+
+def _aiohttp() -> Any:
+    """The package, which nothing but the live page needs.
+
+    Raises:
+        DescriptionError: it is missing.
+    """
+    try:
+        import aiohttp.web
+    except ImportError:
+        remedy = "Install it: apt-get install python3-aiohttp"
+        raise DescriptionError("live page", "the Python package aiohttp is missing", remedy) from None
+    return aiohttp
+
+
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data: blob:; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+# results that a page which is opened later needs
+_KEPT = ("mesh", "curve", "errors", "linear", "fitted", "iterate", "failed")
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Options of the server.
+
+    Attributes:
+        port: on 127.0.0.1; 0 for a free one.
+        restarts: of the solver process within ``within`` seconds; more are a failure that is told.
+        within: seconds.
+        patience: seconds after which a solver that does not leave its task for the next one is started again; compiling
+            new forms, which nothing ends, takes up to a minute.
+        longest_export: seconds that the files of an export may take.
+        door: seconds for which the address that opens the browser works.
+        stored: folder of first results for the next start; None: none are stored.
+        solver: command of the solver process.
+        solid: command of the process that solves in space.
+    """
+
+    port: int = 0
+    restarts: int = 3
+    within: float = 30.0
+    patience: float = 120.0
+    longest_export: float = 300.0
+    door: float = 30.0
+    stored: Path | None = field(default_factory=user_cache)
+    solver: tuple[str, ...] = (sys.executable, "-c", "from fenicsmech.live.solver import main; main()")
+    solid: tuple[str, ...] = (sys.executable, "-c", "from fenicsmech.live.solid import main; main()")
+
+
+class Server:
+    """The live page of one project.
+
+    Args:
+        project: shown first.
+        options: of the server.
+
+    Attributes:
+        session: the project and its history.
+        address: of the page, token included; after ``start``.
+    """
+
+    def __init__(self, project: Project, options: ServerOptions | None = None) -> None:
+        self.session, self._options = Session(project), options or ServerOptions()
+        self.token, self.address = secrets.token_urlsafe(24), ""
+        self._pages: set[Outbox] = set()
+        self._doors: dict[str, float] = {}  # codes, and when they end
+        self._solver = SolverProcess(self._from_solver, self._options)
+        self._solid = Job(self._options.solid, self._tell)
+        self._number, self._pushed = 1, False
+        self._kept: dict[tuple[str, int | None], str] = {}
+        self._stored = StoredResults(self._options.stored)
+        self._opened = None if self.session.task["fit"] else self.session.project  # whose results may be stored
+        self._state: dict[str, Any] = {"event": "solver", "state": "starting"}
+        self._drawn: Mapping[str, Any] | None = None  # the last final curve
+        self._first: dict[int, dict[str, Any]] = {}  # curves of the project as it was opened
+        self._runner: Any = None
+        self._exporting = asyncio.Semaphore(1)
+
+    async def start(self) -> None:
+        """Starts the solver, and listens."""
+        web = _aiohttp().web
+        await self._solver.start()
+        if self._opened is not None:
+            self._kept = self._stored.find(self._opened)
+
+        @web.middleware
+        async def guard(request: Any, handler: Handler) -> Any:
+            return await self._guarded(request, handler)
+
+        app = web.Application(middlewares=[guard])
+        app.router.add_get("/open/{code}", self._open, allow_head=False)  # which would use it up
+        app.router.add_get(f"/{self.token}/", self._index)
+        app.router.add_get(f"/{self.token}/ws", self._socket)
+        app.router.add_get(f"/{self.token}/export/{{what}}", self._export)
+        app.router.add_static(f"/{self.token}/page/", PAGE)
+        self._runner = runner = web.AppRunner(app, access_log=None)
+        await runner.setup()
+        await web.TCPSite(runner, "127.0.0.1", self._options.port).start()
+        self.port = runner.addresses[0][1]
+        self.address = f"http://127.0.0.1:{self.port}/{self.token}/"
+        await self._ask(self.session.task)
+
+    async def stop(self) -> None:
+        """Ends the solver and closes all pages."""
+        await self._solid.stop()
+        await self._solver.stop()
+        for page in list(self._pages):
+            await page.close()
+        if self._runner is not None:
+            await self._runner.cleanup()
+
+    def door(self) -> str:
+        """An address that leads to the page once and soon: every user may read the command line of a browser."""
+        code = secrets.token_urlsafe(24)
+        self._doors[code] = monotonic() + self._options.door
+        return f"http://127.0.0.1:{self.port}/open/{code}"
+
+    @property
+    def solver_pid(self) -> int | None:
+        """Of the solver process."""
+        return self._solver.pid
+
+    # -- requests ------------------------------------------------------------------------------------------------
+
+    async def _guarded(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        names = {f"{host}:{self.port}" for host in ("127.0.0.1", "localhost")}
+        origin = request.headers.get("Origin")
+        foreign = request.headers.get("Host") not in names
+        foreign = foreign or (origin is not None and origin.removeprefix("http://") not in names)
+        given = request.path.split("/")[1]
+        known = given == "open" or secrets.compare_digest(given.encode(), self.token.encode())
+        if foreign or not known:
+            raise _aiohttp().web.HTTPForbidden(text="This page is not for you.")
+        response = await handler(request)
+        if not response.prepared:
+            response.headers.update(_HEADERS)
+        return response
+
+    async def _open(self, request: web.Request) -> web.StreamResponse:
+        web = _aiohttp().web
+        if self._doors.pop(request.match_info["code"], 0.0) <= monotonic():
+            raise web.HTTPForbidden(text="This address has been used or is too old. Open the one that is printed.")
+        return web.Response(status=302, headers={"Location": self.address})
+
+    async def _index(self, _request: web.Request) -> web.StreamResponse:
+        return _aiohttp().web.FileResponse(PAGE / "index.html")
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        web = _aiohttp().web
+        if request.headers.get("Origin") is None:
+            raise web.HTTPForbidden(text="This page is not for you.")
+        page = web.WebSocketResponse(max_msg_size=LARGEST, heartbeat=30.0)
+        await page.prepare(request)
+        outbox = Outbox(page, request.transport, self._opening())
+        self._pages.add(outbox)
+        recent: deque[float] = deque(maxlen=PER_SECOND)
+        try:
+            async for message in page:
+                now = monotonic()
+                outbox.heard += 1
+                try:
+                    if message.type is not web.WSMsgType.TEXT:
+                        raise Refused("", "not a text")
+                    if len(recent) == PER_SECOND and now - recent[0] < 1.0:
+                        raise Refused("", f"more than {PER_SECOND} messages a second")
+                    recent.append(now)
+                    await self._from_page(read_message(message.data))
+                except Refused as refused:
+                    told = {"event": "refused", "place": refused.place, "problem": refused.problem}
+                    for event in (self._state, self._project_event(), told):  # it may show what was refused
+                        outbox.put(json.dumps(event))
+        finally:
+            self._pages.discard(outbox)
+            outbox.end()
+        return page
+
+    async def _export(self, request: web.Request) -> web.StreamResponse:
+        web, what = _aiohttp().web, request.match_info["what"]
+        try:
+            EXPORTS.check(what, "export")
+        except Refused as refused:
+            raise web.HTTPNotFound(text=str(refused)) from None
+        project = self.session.project
+        stem = re.sub(r"[^A-Za-z0-9]+", "-", project["name"]).strip("-") or "mechanism"
+        if what == "project":
+            name, data = f"{stem}.json", json.dumps(project, indent=1, ensure_ascii=False).encode()
+        elif what == "script":
+            name, data = f"{stem}.py", script(project).encode()
+        else:
+            async with self._exporting:
+                head, _, data = (await self._exported(project, what)).partition(b"\n")
+            told = json.loads(head or b'{"problem": "The files could not be made."}')
+            if "problem" in told:
+                self._tell({"event": "refused", "place": f"export of {what}", "problem": told["problem"]})
+                raise web.HTTPConflict(text=told["problem"])
+            name = told["name"] if told["name"] != "files.zip" else f"{stem}-{what}.zip"
+        headers = {"Content-Disposition": f'attachment; filename="{re.sub(r"[^A-Za-z0-9.-]+", "-", name)}"'}
+        return web.Response(body=data, content_type="application/octet-stream", headers=headers)
+
+    async def _exported(self, project: Project, what: str) -> bytes:
+        """What the process that makes files writes."""
+        pipe, none = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
+        command = (sys.executable, "-c", "from fenicsmech.live.export import main; main()")
+        process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, stderr=none)
+        try:
+            task = json.dumps({"project": project, "what": what}).encode()
+            return (await asyncio.wait_for(process.communicate(task), self._options.longest_export))[0]
+        except TimeoutError:
+            return json.dumps({"problem": f"it takes longer than {self._options.longest_export:g} s"}).encode()
+        finally:
+            if process.returncode is None:
+                process.kill()
+                await process.wait()
+
+    async def _from_page(self, message: Mapping[str, Any]) -> None:
+        if message["kind"] == "solve solid":
+            self.session.check_curve(message["curve"])
+            await self._solid.start({"project": self.session.project, "curve": message["curve"]})
+            self._tell(self._state)
+            return
+        if message["kind"] == "stop solid":
+            if await self._solid.stop() or (self._solid.last or {}).get("state") == "solving":
+                self._solid.tell({"event": "solid", "state": "cancelled"})
+            self._tell(self._state)
+            return
+        opened = self.session.opened
+        answer = self.session.answer(message)
+        if answer.stop or answer.task is not None:
+            self._number += 1  # before anything is awaited: results of earlier tasks are not of this project
+        if answer.changed:
+            self._tell(self._project_event())
+        if opened != self.session.opened:
+            self._first = {}
+            self._tell(self._first_event())
+        if answer.stop:
+            self._say("idle")
+            await self._solver.interrupt(self._number)
+        elif answer.task is not None:
+            await self._ask(answer.task)
+        else:
+            self._tell(self._state)  # every message is answered with one
+        if opened != self.session.opened:
+            await self._solid.forget()
+
+    # -- solver --------------------------------------------------------------------------------------------------
+
+    async def _ask(self, task: Mapping[str, Any]) -> None:
+        self._pushed = task["kind"] == "push"
+        self._say("busy")
+        await self._solver.ask({**task, "task": self._number})
+
+    def _from_solver(self, event: dict[str, Any]) -> None:
+        if event["event"] in ("ready", "restarted", "lost"):
+            if event["event"] == "lost":
+                self._say("failed")
+            return
+        if event["task"] != self._number:
+            return
+        if event["event"] in ("iterate", "fitted"):
+            self.session.designed(event["design"])
+        if event["event"] in ("done", "failed") and not self._pushed:
+            self.session.solved = True
+        if event["event"] in ("done", "cancelled", "failed"):
+            self._say("idle", seconds=event.get("seconds"))
+        text = json.dumps(event)
+        if event["event"] in _KEPT and not self._pushed:
+            if event["event"] == "mesh":
+                self._kept.clear()
+            self._kept[event["event"], event.get("curve")] = text
+        if event["event"] == "done" and event["task"] == 1 and self._opened is not None:
+            self._stored.store(self._opened, self._kept)
+        self._send(text)
+        self._note_first(event)
+
+    def _note_first(self, event: Mapping[str, Any]) -> None:
+        """Keeps curves of the project as it was opened, with their errors, to be compared with."""
+        if event["event"] == "curve" and event["iterate"] is None and event["points"]:
+            self._drawn = event
+        if event["event"] != "errors" or self._drawn is None or self._drawn["curve"] != event["curve"]:
+            return
+        number, project = event["curve"], self.session.project
+        if number not in self._first and self.session.untouched:
+            own = project["curves"][number]
+            self._first[number] = {
+                "force": next(force for force in project["forces"] if force["name"] == own["force"]),
+                "positions": own["positions"],
+                "others": own["others"],
+                "points": [
+                    [point["displacement"] + error, point["force"]]
+                    for point, error in zip(self._drawn["points"], event["errors"], strict=True)
+                ],
+            }
+            self._tell(self._first_event())
+
+    def _say(self, state: str, **more: Any) -> None:
+        self._state = {"event": "solver", "state": state, "task": self._number, **more}
+        self._tell(self._state)
+
+    # -- pages ---------------------------------------------------------------------------------------------------
+
+    def _opening(self) -> list[str]:
+        """What a page gets first."""
+        project = json.dumps(self._project_event())
+        opening = [project, json.dumps(self._first_event()), json.dumps(self._state), *self._kept.values()]
+        if self._solid.last is not None:
+            opening.append(json.dumps(self._solid.last))
+        return [*opening, project]  # designs of what is kept may be those of an earlier task
+
+    def _project_event(self) -> dict[str, Any]:
+        return {
+            "event": "project",
+            "project": self.session.project,
+            "undo": self.session.can_undo,
+            "redo": self.session.can_redo,
+            "opened": self.session.opened,
+            "examples": example_names(),
+            "materials": materials(),
+            "most": {"curves": MOST_CURVES, "targets": MOST_TARGETS},
+        }
+
+    def _first_event(self) -> dict[str, Any]:
+        return {"event": "first", "curves": list(self._first.values())}
+
+    def _tell(self, event: Mapping[str, Any]) -> None:
+        self._send(json.dumps(event))
+
+    def _send(self, text: str) -> None:
+        for page in self._pages:
+            page.put(text)
+
+
+class Outbox:
+    """What waits to be sent to a page, in its order: a page that does not read holds up no other.
+
+    Args:
+        page: an open WebSocket.
+        transport: of its connection, which is cut when too much waits; the page connects again, to the present state.
+        opening: sent first; however much it is, the page can do with no less.
+
+    Attributes:
+        heard: messages of the page so far, which each message to it tells.
+    """
+
+    def __init__(
+        self, page: web.WebSocketResponse, transport: asyncio.Transport | None, opening: Iterable[str]
+    ) -> None:
+        self._page, self._transport = page, transport
+        self._waiting: asyncio.Queue[tuple[int, str, int]] = asyncio.Queue()  # heard, text, share of the size
+        self.heard, self._size = 0, 0
+        for text in opening:
+            self._waiting.put_nowait((0, text, 0))
+        self._work = asyncio.create_task(self._write())
+
+    def put(self, text: str) -> None:
+        """Adds a message, a JSON object that is not empty."""
+        if self._size > MOST_WAITING and self._transport is not None:
+            self._transport.abort()
+            return
+        self._size += len(text)
+        self._waiting.put_nowait((self.heard, text, len(text)))
+
+    async def close(self) -> None:
+        """Closes the page."""
+        self.end()
+        await self._page.close()
+
+    def end(self) -> None:
+        """Sends no more."""
+        self._work.cancel()
+
+    async def _write(self) -> None:
+        while True:
+            heard, text, size = await self._waiting.get()
+            with suppress(ConnectionError, RuntimeError):  # it has just gone
+                await self._page.send_str(f'{{"heard": {heard}, {text[1:]}')
+            self._size -= size
+
+
+class SolverProcess:
+    """The solver process, started again when it dies.
+
+    Args:
+        receive: called with every result.
+        options: of restarts.
+    """
+
+    def __init__(self, receive: Callable[[dict[str, Any]], None], options: ServerOptions) -> None:
+        self._receive, self._options = receive, options
+        self._process: asyncio.subprocess.Process | None = None
+        self._reader: asyncio.Task | None = None
+        self._last: Mapping[str, Any] | None = None
+        self._given: tuple[asyncio.subprocess.Process, int] | None = None  # the last task, and who has it
+        self._begun = 0  # the last task that was heard of
+        self._waiting: asyncio.TimerHandle | None = None  # since a task was given that has not begun
+        self._ends: deque[float] = deque(maxlen=options.restarts)
+        self._starting, self._stopped = asyncio.Lock(), False
+
+    @property
+    def pid(self) -> int | None:
+        """Of the process at work."""
+        return None if self._process is None else self._process.pid
+
+    async def start(self) -> None:
+        """Starts it."""
+        async with self._starting:
+            await self._start()
+
+    async def _start(self) -> None:
+        self._process = await asyncio.create_subprocess_exec(
+            *self._options.solver,
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+            limit=2**26,
+        )
+        self._reader = asyncio.create_task(self._read(self._process))
+
+    async def ask(self, task: Mapping[str, Any]) -> None:
+        """Gives it a task, which cancels the one before."""
+        self._last = task
+        async with self._starting:
+            if self._process is None and not self._stopped:  # it was lost; another task may do
+                self._ends.clear()
+                await self._start()
+        if task is not self._last:
+            return  # a later one has come
+        await self._write(task)
+        if self._waiting is None and not self._stopped:
+            self._wait()
+
+    async def interrupt(self, number: int) -> None:
+        """Ends the task at work."""
+        self._last = None
+        await self._write({"task": number, "kind": "nothing"})
+
+    async def stop(self) -> None:
+        """Ends the process."""
+        self._stopped = True
+        async with self._starting:
+            process, self._process = self._process, None
+        if self._reader is not None:
+            self._reader.cancel()
+        if self._waiting is not None:
+            self._waiting.cancel()
+        if process is not None and process.returncode is None:
+            process.kill()
+            await process.wait()
+
+    def _urge(self) -> None:
+        """Ends a process that has not begun its last task."""
+        self._waiting = None
+        if self._last is not None and self._begun < self._last["task"] and self._process is not None:
+            _log.warning("the solver process does not answer and is started again")
+            with suppress(ProcessLookupError):
+                self._process.kill()
+
+    def _wait(self) -> None:
+        self._waiting = asyncio.get_running_loop().call_later(self._options.patience, self._urge)
+
+    def _heard(self, task: int) -> None:
+        """Notes a task that has begun; the patience for a later one begins."""
+        if task <= self._begun:
+            return
+        self._begun = task
+        if self._waiting is not None:
+            self._waiting.cancel()
+            self._waiting = None
+            if self._last is not None and task < self._last["task"]:
+                self._wait()
+
+    async def _write(self, task: Mapping[str, Any]) -> None:
+        process = self._process
+        if process is None or process.stdin is None or self._given == (process, task["task"]):
+            return  # where the start of a process and a task meet, both bring the task
+        self._given = process, task["task"]
+        with suppress(ConnectionError, RuntimeError):  # it has just died, and gets the task when it is back
+            process.stdin.write(json.dumps(task).encode() + b"\n")
+            await process.stdin.drain()
+
+    async def _read(self, process: asyncio.subprocess.Process) -> None:
+        try:
+            async for event in events(process):
+                self._heard(event.get("task", 0))
+                self._receive(event)
+        except Exception:  # nobody waits for this: it would end silently
+            _log.exception("the solver process says what nobody understands")
+            with suppress(ProcessLookupError):
+                process.kill()
+        await process.wait()
+        if process is not self._process or self._stopped:
+            return
+        _log.warning("the solver process ended with %s", process.returncode)
+        now = asyncio.get_running_loop().time()
+        if len(self._ends) == self._options.restarts and now - self._ends[0] < self._options.within:
+            self._process = None
+            self._receive({"event": "lost"})
+            return
+        self._ends.append(now)
+        await self.start()
+        self._receive({"event": "restarted"})
+        if self._last is not None:
+            await self._write(self._last)
+
+
+def serve(project: Project, *, options: ServerOptions | None = None, browse: bool = True) -> None:
+    """Opens the page of a project and serves it until interrupted.
+
+    Args:
+        project: shown first.
+        options: of the server.
+        browse: whether a browser is opened.
+    """
+
+    async def run() -> None:
+        server = Server(project, options)
+        await server.start()
+        print(f"Live page: {server.address}", flush=True)
+        try:
+            if browse:  # some browsers are waited for
+                await asyncio.to_thread(webbrowser.open, server.door())
+            await asyncio.Event().wait()
+        finally:
+            await server.stop()
+
+    with suppress(KeyboardInterrupt):
+        asyncio.run(run())

@@ -1,0 +1,261 @@
+"""What the solver of the live page computes, in its own process and from its script."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import runpy
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import fenicsmech as fm
+from fenicsmech.live import Solver, edited, example, export, project_of, script
+
+
+def solved(project, *, fit=False, cancelled=lambda events: False, kind="solve", **more):
+    """The events of a task."""
+    events: list[dict] = []
+    solver = Solver(
+        lambda event: events.append(json.loads(json.dumps(event, allow_nan=False))), lambda: cancelled(events)
+    )
+    solver.run({"task": 1, "kind": kind, "project": project, "fit": fit, **more})
+    return events
+
+
+def only(events, name):
+    return [event for event in events if event["event"] == name]
+
+
+@pytest.fixture(scope="module")
+def finished():
+    """The finished example, with coarse elements and few frames, and its events."""
+    project = edited(
+        example("truss-finger"),
+        [
+            {"kind": "set", "path": ["curves", 0, "steps"], "value": 4},
+            {"kind": "set", "path": ["simulation", "order"], "value": 1},
+        ],
+    )
+    return project, solved(project)
+
+
+@pytest.mark.thorough
+def test_the_linear_preview_is_the_derivative_of_the_curve(finished):
+    project, events = finished
+    (linear,), (curve,) = only(events, "linear"), only(events, "curve")
+    assert linear["whole"]
+    own = linear["curves"][0]
+    values = [point["displacement"] for point in curve["points"][1:]]
+    assert own["values"] == pytest.approx(values, rel=1e-4)
+    step = 1e-3 * np.random.default_rng(1).normal(size=len(linear["lengths"])) * linear["lengths"]
+    moved = []
+    for sign in (-1.0, 1.0):
+        offsets = (np.array(project["design"]["offsets"]) + sign * step).tolist()
+        at = edited(project, [{"kind": "set", "path": ["design", "offsets"], "value": offsets}])
+        moved.append([point["displacement"] for point in only(solved(at), "curve")[0]["points"][1:]])
+    change = 0.5 * (np.array(moved[1]) - moved[0])
+    assert np.array(own["jacobian"]) @ step == pytest.approx(change, rel=0.02, abs=0.02 * np.abs(change).max())
+
+
+@pytest.mark.thorough
+def test_a_new_gesture_ends_an_optimisation_at_its_next_iterate(finished):
+    project, _ = finished
+    other = edited(project, [{"kind": "set", "path": ["targets", 1, "displacement"], "value": 7.5}])
+    events = solved(other, fit=True, cancelled=lambda events: len(only(events, "iterate")) >= 2)
+    assert len(only(events, "iterate")) == 2 and events[-1]["event"] == "cancelled"
+
+
+@pytest.mark.thorough
+def test_a_task_ends_where_it_is_cancelled_and_leaves_no_trace(finished):
+    project, before = finished
+    other = edited(project, [{"kind": "set", "path": ["targets", 1, "displacement"], "value": 8.0}])
+    events: list[dict] = []
+    asked, last = 0, math.inf
+
+    def cancelled():
+        nonlocal asked
+        asked += 1
+        return asked >= last
+
+    def fresh():  # one that has done tasks before keeps equilibria, and asks less often
+        nonlocal asked
+        asked = 0
+        events.clear()
+        return Solver(events.append, cancelled)
+
+    fresh().run({"task": 1, "kind": "solve", "project": other, "fit": True})
+    whole = asked
+    assert only(events, "linear") and whole > 100  # factors of Newton's iterations, adjoints and estimates
+    for share in (0.02, 0.5, 0.97):
+        last, solver = int(share * whole), fresh()
+        solver.run({"task": 2, "kind": "solve", "project": other, "fit": True})
+        assert asked == last and events[-1]["event"] == "cancelled"
+        last = math.inf
+        events.clear()
+        solver.run({"task": 3, "kind": "solve", "project": project, "fit": False})
+        assert results(events) == pytest.approx(results(before), rel=1e-4)
+
+
+def results(events):
+    """Displacements of the curve, their errors and derivatives."""
+    (curve,), (errors,), (linear,) = (only(events, name) for name in ("curve", "errors", "linear"))
+    displacements = [point["displacement"] for point in curve["points"]]
+    return np.concatenate([displacements, errors["errors"], np.ravel(linear["curves"][0]["jacobian"])])
+
+
+def test_a_mechanism_that_cannot_be_is_told_and_the_solver_goes_on(finished):
+    project, events = finished
+    apart = edited(project, [{"kind": "set", "path": ["joints", 5, "at"], "value": [80, 90]}])
+    (failed,) = only(solved(apart), "failed")
+    assert failed["problem"] and failed["remedy"]
+
+
+@pytest.mark.thorough
+def test_a_snap_is_told_with_its_force_and_the_preview_ends_before_it():
+    change = {"kind": "set", "path": ["simulation", "order"], "value": 1}
+    events = solved(edited(example("snapping-switch"), [change]))
+    (curve,), (linear,) = only(events, "curve"), only(events, "linear")
+    (before, after) = next(pair for pair in pairwise(curve["points"]) if pair[1]["snapped"])
+    assert after["displacement"] > 5.0 * before["displacement"]
+    assert "snaps after force" in curve["remarks"][0] and curve["failed"] is None
+    assert not linear["whole"] and linear["curves"][0]["forces"][-1] == before["force"]
+    # the curve is that of the drawn strip, the preview that of its spline
+    assert linear["curves"][0]["values"][-1] == pytest.approx(before["displacement"], rel=0.02)
+
+
+@pytest.mark.thorough
+def test_both_configurations_of_a_motor_follow_their_targets():
+    project = edited(
+        example("four-bar-with-a-motor"),
+        [
+            {"kind": "set", "path": ["curves", 0, "steps"], "value": 2},
+            {"kind": "set", "path": ["curves", 1, "steps"], "value": 2},
+        ],
+    )
+    events = solved(project, fit=True)
+    assert max(map(abs, only(events, "fitted")[0]["misfits"])) < 0.01
+    assert {event["curve"] for event in only(events, "curve") if event["iterate"] is None} == {0, 1}
+
+
+def test_a_push_moves_as_far_as_the_curve_says(finished):
+    project, events = finished
+    (pushed,) = only(solved(project, kind="push", curve=0, force=0.2), "pushed")
+    points = only(events, "curve")[0]["points"]
+    expected = next(point["displacement"] for point in points if point["force"] == pytest.approx(0.2))
+    assert pushed["point"]["displacement"] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("aimed", [pytest.param(True, id="with targets"), pytest.param(False, id="without")])
+def test_the_script_of_a_project_computes_its_curve(finished, aimed, tmp_path, monkeypatch):
+    project, events = finished
+    if not aimed:
+        project = edited(project, [{"kind": "remove", "path": ["targets", 0]}] * 2)
+    (tmp_path / "design.py").write_text(script(project))
+    monkeypatch.chdir(tmp_path)
+    names = runpy.run_path("design.py")
+    points = only(events, "curve")[0]["points"]
+    assert names["curve_0"].displacements == pytest.approx([point["displacement"] for point in points], rel=1e-4)
+    assert (tmp_path / "links" / "diagonal.step").exists() and (tmp_path / "curve-0.png").exists()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "what, names",
+    [
+        ("stl", ["diagonal.stl"]),
+        ("step", ["diagonal.step"]),
+        ("png", ["curve.png", "mechanism.png"]),
+        ("animation", ["animation.gif"]),
+    ],
+)
+def test_a_project_is_exported_as_files_that_others_read(finished, what, names, tmp_path):
+    project, events = finished
+    paths = export(project, what, tmp_path)
+    assert [path.name for path in paths] == names
+    if what == "stl":  # a header, and fifty bytes a facet
+        assert (paths[0].stat().st_size - 84) % 50 == 0 and paths[0].stat().st_size > 5000
+    elif what == "step":
+        assert paths[0].read_text().startswith("ISO-10303-21")
+    else:
+        there_and_back = 2 * len(only(events, "curve")[0]["points"]) - 2
+        for path in paths:
+            with Image.open(path) as picture:
+                assert min(picture.size) > 200
+                assert picture.format != "GIF" or picture.n_frames == there_and_back
+
+
+def test_names_of_a_project_cannot_put_code_into_its_script(finished, tmp_path):
+    project, _ = finished
+    name = '"""+__import__("os").system("x")+"""'
+    hostile = edited(project, [{"kind": "set", "path": ["name"], "value": name}])
+    for k in range(len(project["links"])):
+        hostile["links"][k]["name"] += " \\' import os"
+    compiled = compile(script(hostile | {"joints": [], "forces": [], "curves": [], "targets": []}), "design.py", "exec")
+    assert "system" not in compiled.co_names and "__import__" not in compiled.co_names
+
+
+def test_parts_of_one_name_are_different_variables_of_the_script():
+    project = example("truss-finger")
+    project["joints"][0]["name"] = project["joints"][1]["name"].upper()  # one spelling as variables
+    project["joints"][2]["name"] = "diagonal"  # as a link
+    variables = re.findall(r"^(part_\w+) = ", script(project), re.MULTILINE)
+    assert len(variables) == len(set(variables)) == sum(len(project[own]) for own in ("links", "joints", "forces"))
+
+
+def test_an_outline_is_exported_as_dxf_in_its_place(finished, tmp_path):
+    project, _ = finished
+    (path,) = export(project, "dxf", Path(tmp_path))
+    lines = path.read_text().split("\n")
+    points = np.array([[lines[k + 4], lines[k + 6]] for k, line in enumerate(lines) if line == "VERTEX"], dtype=float)
+    assert lines[-3:] == ["0", "EOF", ""] and len(points) > 50
+    assert points.min(axis=0) == pytest.approx([-3.0, -3.0], abs=0.3) and points.max(axis=0) == pytest.approx(
+        [43.0, 63.0], abs=0.3
+    )
+
+
+def test_a_problem_of_a_script_is_the_project_that_describes_it():
+    drawn = example("truss-finger")
+    finger = fm.Mechanism("truss finger")
+    base = finger.rigid("base", fixed=True)
+    left, right, tip = (finger.rigid(name) for name in ("left leg", "right leg", "tip"))
+    shape = fm.strip([(0, 0), (18, 34), (40, 60)], thickness=3.0, depth=20.0)
+    diagonal = finger.flexible("diagonal", shape, fm.SMOOTH_SIL_950)
+    for (a, b), at, name in (
+        ((base, left), (0, 0), "foot of left leg"),
+        ((base, right), (40, 0), "foot of right leg"),
+        ((left, tip), (0, 60), "head of left leg"),
+        ((right, tip), (40, 60), "head of right leg"),
+    ):
+        finger.revolute(a, b, at=at, name=name)
+    finger.revolute(base, diagonal, at=(0, 0), interface_radius=3.0, name="foot of diagonal")
+    finger.revolute(diagonal, tip, at=(40, 60), interface_radius=3.0, name="head of diagonal")
+    push = finger.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
+    sim = fm.Simulation(fm.Scene(finger), space="3d", size=3.0)
+    targets = [fm.Target(push, force=0.1, displacement=6.0), fm.Target(push, force=0.4, displacement=9.0)]
+    problem = fm.DesignProblem(sim, [fm.SplineDesign(diagonal, segments=3, thickness=(1.5, 6.0))], targets=targets)
+    assert project_of(problem) == drawn | {"design": None}
+
+
+def test_a_problem_that_the_page_does_not_know_is_refused_by_name():
+    beam = fm.Mechanism("beam")
+    ground, link = (
+        beam.rigid("ground", fixed=True),
+        beam.flexible(
+            "rubber",
+            fm.strip([(0, 0), (40, 0)], thickness=2.0, depth=5.0),
+            fm.Material("rubber", law=fm.Yeoh(1.0, 0.1, 0.0, nu=0.45)),
+        ),
+    )
+    beam.weld(ground, link, at=(0, 0), interface_radius=2.0)
+    pull = beam.force(on=link, at=(40, 0), direction=(0, 1))
+    sim = fm.Simulation(fm.Scene(beam), space="plane-strain", size=2.0)
+    problem = fm.DesignProblem(
+        sim, [fm.SplineDesign(link, segments=1)], targets=[fm.Target(pull, force=0.1, displacement=1.0)]
+    )
+    with pytest.raises(fm.DescriptionError, match="Yeoh"):
+        project_of(problem)

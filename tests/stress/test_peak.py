@@ -1,0 +1,170 @@
+"""Recovered peaks against exact solutions, and the places that are kept out of them."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+from benchmarks.stress_cases import CASES
+from fenicsmech.stress import von_mises
+
+from ..simulation.clamped import cantilever
+
+COMMS = (MPI.COMM_SELF, MPI.COMM_WORLD)
+STEEL = fm.Material("steel", 1e6, 0.3)
+
+
+def bent_bar(size: float, *, angle: float = 0.0, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[fm.Simulation, fm.Frame]:
+    """Half a ring of radii 2 and 4 with straight ends, clamped at one, under a couple of 0.02 at the other."""
+    mechanism, tab, turn = fm.Mechanism("half a ring"), 3.0, np.exp(1j * angle)
+
+    def at(x: float, y: float) -> tuple[float, float]:
+        z = complex(x, y) * turn
+        return z.real, z.imag
+
+    segments = [
+        fm.Line(at(4, 0)), fm.Arc(at(0, 4), at(-4, 0)), fm.Line(at(-4, -tab)), fm.Line(at(-2, -tab)),
+        fm.Line(at(-2, 0)), fm.Arc(at(0, 2), at(2, 0)), fm.Line(at(2, -tab)),
+    ]  # fmt: skip
+    shape = fm.outline(at(4, -tab), segments, depth=1.0)
+    base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
+    bar = mechanism.flexible("bar", shape, STEEL)
+    mechanism.weld(base, bar, at=at(3, -tab), region=fm.Rectangle(3.0, 2.0, angle), name="clamp")
+    mechanism.weld(bar, hand, at=at(-3, -tab), region=fm.Rectangle(3.0, 2.0, angle))
+    couple = {
+        mechanism.force(on=hand, at=at(-3, y), direction=at(x, 0), name=f"{x}"): 1.0 for x, y in ((1, 50), (-1, -50))
+    }
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=size, comm=comm)
+    return simulation, simulation.load_displacement(fm.ForceGroup("couple", couple), forces=[2e-4]).frames[-1]
+
+
+def estimated_well(peak: fm.StressPeak, known: float) -> bool:
+    """Whether the estimate is within a factor of two of the error; where that is below half a per cent, no less."""
+    estimate, error = peak.error / known, abs(peak.value / known - 1.0)
+    return 0.5 * error < estimate < max(2.0 * error, 0.01)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_curved_bar_in_pure_bending(angle):
+    _, frame = bent_bar(1.0, angle=angle)
+    expected = next(case for case in CASES if case.name == "curved bar").reference("plane-stress", 0.0).value
+    assert frame.peak.value == pytest.approx(expected, rel=0.01)
+    assert np.linalg.norm(frame.peak.place) == pytest.approx(2.0, rel=1e-3)
+    assert frame.peak.link == "bar"
+
+
+@pytest.mark.parametrize("share", [1.0, pytest.param(0.5, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_peaks_are_those_of_closed_forms_or_fine_elements(case, share):
+    peak, known = case.solved("plane-stress", share * case.size)
+    error = abs(peak.value / known.value - 1.0)
+    assert error < (0.03 if share == 1.0 else 0.01)
+    assert estimated_well(peak, known.value)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_peaks_in_space_are_those_of_closed_forms_or_fine_elements(case):
+    peak, known = case.solved("3d-symmetric", case.size)
+    assert peak.value == pytest.approx(known.value, rel=0.03)
+    assert estimated_well(peak, known.value)
+
+
+def test_estimated_error_falls_as_elements_shrink():
+    coarse, fine = (bent_bar(size)[1].peak for size in (1.0, 0.15))
+    assert fine.error / fine.value < 0.01
+    assert fine.error < 0.5 * coarse.error
+
+
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("size", [1.0, 0.5])
+def test_cantilever(space, size):
+    beam = cantilever(space, length=20.0, poisson=0.3, size=size)
+    frame = beam.simulation.load_displacement(beam.force, forces=[1e-2]).frames[-1]
+    # 6 F (L − x) / b h²
+    x, *across = frame.peak.place
+    assert frame.peak.value == pytest.approx(6.0 * 1e-2 * (20.0 - x), rel=0.01)
+    assert 0.0 < x < 1.5
+    assert abs(across[0]) == pytest.approx(0.5, rel=1e-9)
+    assert all(place.startswith("rim of") for place in frame.peak.left_out)
+
+
+@pytest.mark.parametrize("region", [fm.Face(), fm.Rectangle(0.5, 2.0)])
+def test_forces_on_regions_load_the_surface_there_alone(region):
+    mechanism = fm.Mechanism("cantilever")
+    base = mechanism.rigid("base", fixed=True)
+    beam = mechanism.flexible("beam", fm.strip([(-1, 0), (10, 0)], thickness=1.0, depth=1.0), STEEL)
+    mechanism.weld(base, beam, at=(-0.5, 0), region=fm.Rectangle(1.0, 1.5))
+    push = mechanism.force(on=beam, at=(10, 0), direction=(0, 1), region=region)
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=1.0, comm=MPI.COMM_SELF)
+    peak = simulation.load_displacement(push, forces=[1e-2]).frames[-1].peak
+    arm = 10.0 if isinstance(region, fm.Face) else 10.0 - 0.125  # the link ends in the middle of the rectangle
+    assert peak.value == pytest.approx(6e-2 * (arm - peak.place[0]), rel=0.01)
+
+
+def bracket(size: float) -> tuple[fm.Simulation, fm.Frame]:
+    """An L of width 2, its corner re-entrant at (2, 2), under a force along x at the end of the upright arm."""
+    mechanism = fm.Mechanism("bracket")
+    base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
+    corners = [(0, 0), (9, 0), (9, 2), (2, 2), (2, 9), (0, 9)]
+    arm = mechanism.flexible("arm", fm.polygon(corners, depth=1.0), STEEL)
+    mechanism.weld(base, arm, at=(9, 1), region=fm.Rectangle(2, 4), name="clamp")
+    mechanism.weld(arm, hand, at=(1, 9), region=fm.Rectangle(4, 2))
+    force = mechanism.force(on=hand, at=(1, 9), direction=(1, 0))
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=size, comm=MPI.COMM_SELF)
+    return simulation, simulation.load_displacement(force, forces=[0.1]).frames[-1]
+
+
+def test_peak_beside_a_reentrant_corner_has_a_limit():
+    peaks, largest = [], []
+    for size in (0.4, 0.2):
+        simulation, frame = bracket(size)
+        peaks.append(frame.peak.value)
+        simulation.model.load(frame.state)
+        largest.append(von_mises(simulation.model.elastic.stress_samples()[0]).max())
+        assert "re-entrant corner at (2, 2)" in frame.peak.left_out
+        assert np.linalg.norm(np.subtract(frame.peak.place, (2, 2))) > 0.49
+    assert largest[1] > 1.15 * largest[0]
+    assert peaks[1] == pytest.approx(peaks[0], rel=0.03)
+
+
+def test_places_that_hold_the_whole_surface_are_named():
+    mechanism = fm.Mechanism("stub")
+    base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
+    stub = mechanism.flexible("stub", fm.strip([(0, 0), (10, 0)], thickness=4.0, depth=1.0), STEEL)
+    for link, end in ((base, "start"), (hand, "end")):
+        mechanism.clamp(link, stub, end=end, length=4.5)
+    push = mechanism.force(on=hand, at=(10, 0), direction=(0, 1))
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=1.0, comm=MPI.COMM_SELF)
+    peak = simulation.load_displacement(push, forces=[0.1]).frames[-1].peak
+    assert sorted(peak.left_out) == sorted(place.name for place in simulation.singular_places)
+    assert len(peak.left_out) == 2
+
+
+def test_smooth_outlines_have_no_corners():
+    simulation, _ = bent_bar(1.0)
+    names = [place.name for place in simulation.singular_places]
+    assert sorted(names) == ["rim of 'clamp'", "rim of 'weld joint bar–hand'"]
+
+
+def test_stress_is_computed_only_where_it_is_read():
+    simulation, frame = bent_bar(1.0)
+    assert "stress" not in simulation.clock.seconds
+    assert frame.max_stress == frame.peak.value
+    assert "stress" in simulation.clock.seconds
+
+
+def test_reading_a_peak_leaves_the_fields_of_the_model():
+    simulation, frame = bent_bar(1.0)
+    u = simulation.model.elastic.u.x
+    u.array[:] = 1.0
+    assert frame.peak.value > 0.0
+    assert np.all(u.array == 1.0)
+
+
+@pytest.mark.parallel
+def test_any_number_of_ranks_gives_the_same_peak():
+    alone, together = (bent_bar(0.5, comm=comm)[1].peak for comm in COMMS)
+    assert together.value == pytest.approx(alone.value, rel=1e-8)
+    assert together.place == pytest.approx(alone.place, abs=1e-9)
+    assert (together.link, together.left_out) == (alone.link, alone.left_out)
