@@ -46,7 +46,8 @@ live-pictures: install-test ## pictures of the live page in docs/static/
 test: lint test-serial test-parallel ## style, types, layers; fast tests, quick demos among them, on one process; on two ranks
 
 # Debian's newest moves by itself, so it is not part of this.
-check: test-thorough test-slow hard-cases random-scenes-check docs test-debian13 ## everything that `make test` leaves out
+# Every hard case is among its tests.
+check: test-thorough test-slow random-scenes-check docs test-debian13 ## everything that `make test` leaves out
 
 # Where the packages come from elsewhere (the Debian 13 root), INSTALL= switches the installation off.
 INSTALL := yes

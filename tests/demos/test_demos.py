@@ -134,9 +134,8 @@ def test_quick_demo_reaches_its_targets_in_plane_stress(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", DEMOS)
-def test_quick_demo_reaches_its_targets_in_space(name, tmp_path):
-    check_quick(name, *report(name, tmp_path, "--quick", "--space", "3d"), tmp_path)
+def test_quick_claw_reaches_its_targets_in_space(tmp_path):
+    check_quick("claw", *report("claw", tmp_path, "--quick", "--space", "3d"), tmp_path)
 
 
 @pytest.mark.thorough

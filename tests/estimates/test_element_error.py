@@ -103,8 +103,18 @@ def test_curve_file_names_what_the_errors_are_of(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [3.0, 2.0])
-@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("cantilever", 3.0),
+        ("cantilever", 2.0),
+        ("arch", 3.0),
+        ("arch", 2.0),
+        ("truss", 3.0),
+        ("claw", 3.0),
+        ("klann", 3.0),
+    ],
+)
 def test_effectivity_in_space_is_between_a_half_and_two(name, size):
     value, estimate = estimated(name, "3d", 2, size)
     assert 0.5 < estimate / (reference(name, "3d", size) - value) < 2.0

@@ -15,11 +15,12 @@ TABLE = Path(__file__).parents[2] / "docs" / "tables" / "hard-cases.md"
 
 
 def _parameter(case: HardCase, space: str):
-    return pytest.param(case, space, id=f"{case.name}, {space}", marks=[pytest.mark.slow] * case.slow)
+    """A case on ranks in its first space and on one process in the others, as slow ones are in all."""
+    marks = [pytest.mark.slow] * case.slow + [pytest.mark.parallel] * (space == case.spaces[0])
+    return pytest.param(case, space, id=f"{case.name}, {space}", marks=marks)
 
 
 @pytest.mark.thorough
-@pytest.mark.parallel
 @pytest.mark.parametrize("case, space", [_parameter(case, space) for case in CASES for space in case.spaces])
 def test_hard_case(case, space):
     checks = list(case.run(space, MPI.COMM_WORLD))
