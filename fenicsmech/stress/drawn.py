@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.stress.recovered import undeformed
 from fenicsmech.stress.recovery import PatchRecovery, with_image
 
 
@@ -50,8 +51,10 @@ class SurfaceFit:
         stress, F = _square(own[..., :9]), _square(own[..., 9 : 9 + dim**2])
         T = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.solve(F, stress[..., :dim, :dim]), -1, -2)
         across = stress[..., 2, 2, None]
-        fits = self.recovery.fit(T, np.concatenate([across, own[..., 9:]], axis=2))
+        rest = undeformed(own.shape[-1], dim)
+        fits = self.recovery.fit(T, np.concatenate([across, own[..., 9:] - rest], axis=2))
         found = np.concatenate([self._at(part.reshape(*part.shape[:2], -1)) for part in fits], axis=2)
+        found[..., dim**2 + 1 :] += rest
         return FittedStress(self, samples.shape, T, F, np.delete(found, dim**2, axis=2), found[..., dim**2])
 
     def _at(self, coefficients: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from fenicsmech.mechanism import Disc, Face, Force
 from fenicsmech.model import MechanismModel
 from fenicsmech.stress.drawn import SurfaceFit
 from fenicsmech.stress.interpolation import InterpolationError, InterpolationOptions, node_places
-from fenicsmech.stress.recovered import CellFields, Recovered, principal_strain, von_mises
+from fenicsmech.stress.recovered import CellFields, Recovered, principal_strain, undeformed, von_mises
 from fenicsmech.stress.recovery import PatchRecovery, RecoveryOptions, Samples, shape_functions, with_image
 from fenicsmech.stress.recovery_error import HIGHER, SMOOTHER, recovery_error
 from fenicsmech.stress.singular_places import (
@@ -51,14 +51,14 @@ class StressOptions:
 
 @dataclass(frozen=True)
 class StressPeak:
-    """The largest von Mises stress at the surface of flexible links, singular places left out.
+    """The largest stress or strain at the surface of flexible links, singular places left out.
 
     Attributes:
-        value: the stress.
+        value: the von Mises stress, or the largest principal nominal strain of the elastic deformation.
         error: estimated, of the value.
         place: point of the unloaded link, (dim,).
         link: name of the link.
-        left_out: names of singular places near which the stress is above the peak. Where they hold the whole surface
+        left_out: names of singular places near which it is above the peak. Where they hold the whole surface
             of the link, the value is one within them, without a limit, and all are named: smaller elements make room.
     """
 
@@ -74,17 +74,15 @@ class StressPeak:
 
 @dataclass(frozen=True)
 class SurfacePeaks:
-    """Peaks of one equilibrium.
+    """Peaks of stress, or of strain, at one equilibrium.
 
     Attributes:
         whole: the largest of all links.
         links: of each flexible link that has a surface, in their order.
-        strains: likewise, of the largest principal nominal strain of the elastic deformation; empty if not asked for.
     """
 
     whole: StressPeak
     links: tuple[StressPeak, ...]
-    strains: tuple[StressPeak, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -414,10 +412,12 @@ class LinkSurface:
         )
         # T = J σ F⁻ᵀ
         T = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.solve(F, stress[..., :dim, :dim]), -1, -2)
-        others = np.concatenate([stress[..., 2, 2, None], values[..., 9:]], axis=2)
+        rest = undeformed(values.shape[-1], dim)
+        others = np.concatenate([stress[..., 2, 2, None], values[..., 9:] - rest], axis=2)
         T, others = recovery.fit(T, others)
         coefficients = np.concatenate([T.reshape(*T.shape[:2], -1), others], axis=2)
         found = sum(shares[:, corner] @ coefficients[rows[:, corner]] for corner in range(rows.shape[1]))
+        found[..., dim * dim + 1 :] += rest
         across = found[..., dim * dim]
         T, F, *elastic = (
             own.reshape(*own.shape[:2], dim, dim)
@@ -486,23 +486,27 @@ class LinkSurface:
         return float(self.errors(fields, cells, corners, measure)[1].item())
 
     def peaks(self, fields: CellFields) -> SurfacePeaks:
-        """The peaks at an equilibrium, of strains too if there are samples of the elastic part of F."""
-        found, dim, facets = self.recovered(fields), self._model.elastic.model.dim, self.links
-        samples = fields.samples
+        """The peaks of the von Mises stress at an equilibrium."""
         # in fits to both sides of a corner the stress vanishes there: samples tell
-        sampled = von_mises(samples[..., :9].reshape(*samples.shape[:2], 3, 3)).max(axis=1)
-        stressed = _Looked(fields, found, Recovered.von_mises, sampled)
-        masks = [mask for number in range(int(facets.max()) + 1) if (mask := facets == number).any()]
-        strains: tuple[StressPeak, ...] = ()
-        if found.elastic is not None:
-            free = self._flexible[: len(samples)]
-            stretched = samples[..., 9 + dim**2 :].reshape(*samples.shape[:2], dim, dim)[free]
-            largest = np.zeros(len(samples))
-            largest[free] = principal_strain(stretched).max(axis=1)
-            strained = _Looked(fields, found, Recovered.principal_strain, largest)
-            strains = tuple(self._peak(strained, mask) for mask in masks)
-        links = tuple(self._peak(stressed, mask) for mask in masks)
-        return SurfacePeaks(self._peak(stressed, np.ones(len(facets), dtype=bool)), links, strains)
+        stresses = fields.samples[..., :9].reshape(*fields.samples.shape[:2], 3, 3)
+        return self._peaks(fields, Recovered.von_mises, von_mises(stresses).max(axis=1))
+
+    def strain_peaks(self, fields: CellFields) -> SurfacePeaks:
+        """The peaks of the largest principal strain, from fields with the elastic part of F."""
+        dim, samples = self._model.elastic.model.dim, fields.samples
+        free = self._flexible[: len(samples)]
+        elastic = samples[free][..., 9 + dim**2 :]
+        sampled = np.zeros(len(samples))
+        sampled[free] = principal_strain(elastic.reshape(*elastic.shape[:2], dim, dim)).max(axis=1)
+        return self._peaks(fields, Recovered.principal_strain, sampled)
+
+    def _peaks(
+        self, fields: CellFields, measure: Callable[[Recovered], np.ndarray], sampled: np.ndarray
+    ) -> SurfacePeaks:
+        """Those of a measure, whose largest sample in each cell is ``sampled``."""
+        looked, links = _Looked(fields, self.recovered(fields), measure, sampled), self.links
+        own = tuple(self._peak(looked, links == number) for number in np.unique(links))
+        return SurfacePeaks(self._peak(looked, np.ones(len(links), dtype=bool)), own)
 
     def _peak(self, looked: _Looked, mask: np.ndarray) -> StressPeak:
         """The peak on the facets of ``mask``."""
