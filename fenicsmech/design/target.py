@@ -108,6 +108,8 @@ class Target:
                 f"its sample is {sample!r}",
                 "Give Sample(…)" if quantity.of_state else "Leave it out: links at rest have one shape",
             )
+        if sample is not None and sample == quantity.since:
+            raise DescriptionError(part, f"both of its samples are {sample}", "Give two that differ")
         set_fields(
             self,
             quantity=quantity,
@@ -117,6 +119,11 @@ class Target:
             weight=positive(f"weight of a target for the {quantity}", weight),
             scale=None if scale is None else positive(f"scale of the {part}", scale),
         )
+
+    @property
+    def samples(self) -> tuple[Sample, ...]:
+        """The equilibria that the quantity depends on: its sample, then the other one of a cycle; none at rest."""
+        return tuple(own for own in (self.sample, self.quantity.since) if own is not None)
 
     @property
     def size(self) -> int:
@@ -295,9 +302,9 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
     dim = simulation.linkage.dim
     for target in targets:
         expect("design problem", target, Target, "a target", "Give Target(…)")
-        if target.sample is not None:
-            sample_request(simulation, target.sample, [target.sample.value])
-            on_one(simulation.comm, partial(assemble, simulation.linkage, target.sample.configuration))
+        for sample in target.samples:
+            sample_request(simulation, sample, [sample.value])
+            on_one(simulation.comm, partial(assemble, simulation.linkage, sample.configuration))
         target.check(simulation.scene, dim)
         if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
             moved = target.sample.moved

@@ -136,8 +136,8 @@ def edge_stress(
         stress = np.einsum("ni,nij,nj->n", t, found.stress[:, 0, :dim, :dim], t) / length**2
         return np.stack([stress, length / np.linalg.norm(free, axis=1) - 1.0])
 
-    found, errors = surface.errors(fields, line.cells, line.corners[:, None], along)
-    values = np.stack([*along(found), *errors, von_mises(found.stress[:, 0])])
+    found, errors, (recovered,) = surface.errors([fields], line.cells, line.corners[:, None], along)
+    values = np.stack([*found, *errors, von_mises(recovered.stress[:, 0])])
     values[:, ~surface.mesh[3][line.cells]] = np.nan
     stress, strain, error, strain_error, equivalent = values[:, order]
     singular = np.zeros(len(line.cells), dtype=bool)

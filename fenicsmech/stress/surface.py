@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from fenicsmech.mechanism import Disc, Face, Force
 from fenicsmech.model import MechanismModel
 from fenicsmech.stress.drawn import SurfaceFit
 from fenicsmech.stress.interpolation import InterpolationError, InterpolationOptions, node_places
-from fenicsmech.stress.recovered import CellFields, Recovered, principal_strain, undeformed, von_mises
+from fenicsmech.stress.recovered import CellFields, Recovered, principal_strain, turned_back, undeformed, von_mises
 from fenicsmech.stress.recovery import PatchRecovery, RecoveryOptions, Samples, shape_functions, with_image
 from fenicsmech.stress.recovery_error import HIGHER, SMOOTHER, recovery_error
 from fenicsmech.stress.singular_places import (
@@ -473,15 +473,23 @@ class LinkSurface:
         return self._blended(body.recovery, fields.samples, body.rows, body.shares, body.points)
 
     def errors(
-        self, fields: CellFields, cells: np.ndarray, corners: np.ndarray, measure: Callable[[Recovered], np.ndarray]
-    ) -> tuple[Recovered, np.ndarray]:
-        """Recovered fields, arguments as of ``at``, and estimated errors of a measure of them."""
-        found = self.at(fields, cells, corners)
-        smoother, higher = (measure(self.at(fields, cells, corners, own)) for own in (SMOOTHER, HIGHER))
-        return found, recovery_error(measure(found), smoother, higher, self._model.elastic.order)
+        self, fields: Sequence[CellFields], cells: np.ndarray, corners: np.ndarray, measure: Callable[..., np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, list[Recovered]]:
+        """A measure of the fields recovered at some equilibria, its estimated errors, and these fields.
 
-    def error(self, fields: CellFields, facet: int, point: int, measure: Callable[[Recovered], np.ndarray]) -> float:
-        """Estimated error of a measure of recovered fields at one of the points of the surface."""
+        Args:
+            fields: of each equilibrium.
+            cells, corners: as of ``at``.
+            measure: of the fields recovered at all of them.
+        """
+        found, smoother, higher = (
+            [self.at(own, cells, corners, variant) for own in fields] for variant in ((0, 1.0), SMOOTHER, HIGHER)
+        )
+        value = measure(*found)
+        return value, recovery_error(value, measure(*smoother), measure(*higher), self._model.elastic.order), found
+
+    def error(self, fields: Sequence[CellFields], facet: int, point: int, measure: Callable[..., np.ndarray]) -> float:
+        """The estimated error of a measure, as in ``errors``, at one of the points of the surface."""
         cells, corners = self._meshed.cells[[facet]], self._candidates[0][[facet], [[point]]]
         return float(self.errors(fields, cells, corners, measure)[1].item())
 
@@ -525,20 +533,16 @@ class LinkSurface:
             if largest > value or (not room and own.any())
         ]
         link = links[self._link[self._meshed.cells[facet]]]
-        error = self.error(looked.fields, facet, point, looked.measure)
+        error = self.error([looked.fields], facet, point, looked.measure)
         place = tuple(looked.found.points[facet, point].tolist())
         return StressPeak(value, error, place, link.name, tuple(above))
 
     def stress(self, fields: CellFields) -> SurfaceStress:
         """The recovered stress at an equilibrium, turned back with the material."""
         fields = self.whole(fields)
-        body, dim = self._body_of(fields), self._model.elastic.model.dim
+        body = self._body_of(fields)
         found = self._blended(body.recovery, fields.samples, body.rows, body.shares, body.points)
-        R = np.broadcast_to(np.eye(3), found.stress.shape).copy()
-        # F = R U
-        left, _, right = np.linalg.svd(found.F)
-        R[..., :dim, :dim] = left @ right
-        turned = np.swapaxes(R, -1, -2) @ found.stress @ R
+        turned = turned_back(found.stress, found.F)
         links = np.broadcast_to(self.links[:, None], self._held.shape)
         points = body.points.reshape(-1, body.points.shape[-1])
         links, turned, kept = links.ravel(), turned.reshape(-1, 9), ~self._held.ravel()
