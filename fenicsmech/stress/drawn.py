@@ -97,13 +97,13 @@ class FittedStress:
         self.stress[..., :dim, :dim] = _symmetric(plane)
         self.elastic = elastic[0] if elastic else None
 
-    def transposed(self, stress: np.ndarray, by_F: np.ndarray | float, elastic: np.ndarray | None) -> np.ndarray:
+    def transposed(self, stress: np.ndarray, through_F: np.ndarray | float, elastic: np.ndarray | None) -> np.ndarray:
         """Derivatives by the samples, in their shape, from those by ``stress``, ``F`` and ``elastic``."""
         T, F, dim = self._fitted, self.F, self._sampled[0].shape[-1]
         by_stress, J = _symmetric(stress[..., :dim, :dim]), np.linalg.det(F)[..., None, None]
         by_T = by_stress @ F / J
         traces = np.einsum("...ij,...ij->...", by_stress, self.stress[..., :dim, :dim])[..., None, None]
-        by_F = by_F + by_stress @ T / J - traces * _inverse_transposed(F)
+        by_F = through_F + by_stress @ T / J - traces * _inverse_transposed(F)
         across = stress[..., 2, 2, None] if dim == 2 else np.zeros((*stress.shape[:2], 1))
         others = [across, _flat(by_F), *([] if elastic is None else [_flat(elastic)])]
         fits = self._fit.transposed(_flat(by_T)), self._fit.transposed(np.concatenate(others, axis=2))

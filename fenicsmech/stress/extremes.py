@@ -14,17 +14,15 @@ Derivatives: with the weights w = ∂Q/∂τ of the samples τ = (σ, F̂, F_e),
 
     ∂Q/∂y = ∂/∂y ∫ w · τ(u, s) dX₀
 
-over the quadrature whose points the samples are, a form. That of a cycle between two equilibria is one of either while
-the other is held. Source of the norm: P. Duysinx, M. P. Bendsøe, Topology
-optimization of continuum structures with local stress constraints
-(doi:10.1002/(SICI)1097-0207(19981230)43:8<1453::AID-NME480>3.0.CO;2-2).
+over the quadrature whose points the samples are, a form. The life of cycles between two equilibria has one by each,
+the other held. Source of the norm: P. Duysinx, M. P. Bendsøe, Topology optimization of continuum structures with local
+stress constraints (doi:10.1002/(SICI)1097-0207(19981230)43:8<1453::AID-NME480>3.0.CO;2-2).
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce
 from typing import TypeVar
@@ -147,7 +145,7 @@ class _Smooth:
 
 
 class _Extreme(Observable):
-    """The quantity of the largest value of a measure on some links of one model.
+    """The quantity of the largest value of a measure on some links of one model, at a state or in a cycle to another.
 
     Args:
         model: with the links.
@@ -156,9 +154,6 @@ class _Extreme(Observable):
         measure: the measure.
         sharpness: p.
         margin: m.
-
-    Attributes:
-        held: the other equilibrium of a cycle; none by default.
     """
 
     def __init__(
@@ -173,19 +168,17 @@ class _Extreme(Observable):
         self._model, self._chosen, self._measure = model, chosen, measure
         self._sharpness, self._margin = sharpness, margin
         self._comm, self._recovery = model.mesh.comm, recovery
-        self._samples, self.held = _Samples(model, measure.strained), tuple[State, ...]()
+        self._samples = _Samples(model, measure.strained)
 
     def holding(self, other):
-        found = copy(self)
-        found.held = (other,)
-        return found
+        return _Held(self, other)
 
-    def values(self, state):
-        found = self._smooth(state)
+    def values(self, state, *others):
+        found = self._smooth(state, *others)
         return np.array([self._comm.bcast(None if found is None else found.value, root=0)])
 
-    def partials(self, system, state):
-        found = self._smooth(state)
+    def partials(self, system, state, *others):
+        found = self._smooth(state, *others)
         weights = on_one(self._comm, lambda: None if found is None else found.by_samples())
         self._samples.weigh(self._recovery.scattered(weights))
         form = self._samples.form
@@ -197,14 +190,14 @@ class _Extreme(Observable):
             )
         ]
 
-    def smoothing_errors(self, state):
-        return np.array([self._true(state)]) - self.values(state)
+    def smoothing_errors(self, state, *others):
+        return np.array([self._true(state, *others)]) - self.values(state, *others)
 
-    def _smooth(self, state: State) -> _Smooth | None:
-        """At a state, on the first process; None elsewhere."""
+    def _smooth(self, *states: State) -> _Smooth | None:
+        """At a state, or in the cycle from it to another one, on the first process; None elsewhere."""
         fit, surface = self._fit, self._recovery.surface
         with self._model.clock.phase("stress"):
-            samples = self._at_both(state, lambda: self._recovery.gathered(self._samples.values()))
+            samples = self._at(states, lambda: self._recovery.gathered(self._samples.values()))
 
             def find() -> _Smooth:
                 assert fit is not None and surface is not None  # on the first process
@@ -214,11 +207,11 @@ class _Extreme(Observable):
 
             return on_one(self._comm, find)
 
-    def _true(self, state: State) -> float:
-        """The quantity of the largest value recovered at the links at rest, on the safe side."""
+    def _true(self, *states: State) -> float:
+        """The quantity of the largest value recovered at the links at rest, on the safe side; arguments as there."""
         surface = self._recovery.surface
         with self._model.clock.phase("stress"):
-            fields = self._at_both(state, lambda: self._recovery.present(strains=self._measure.strained))
+            fields = self._at(states, lambda: self._recovery.present(strains=self._measure.strained))
 
             def measured(links: np.ndarray, own: Recovered, *others: Recovered) -> np.ndarray:
                 return self._between(others).values(own, links)
@@ -235,23 +228,38 @@ class _Extreme(Observable):
 
             return from_one(self._comm, find)
 
-    def _at_both(self, state: State, find: Callable[[], T]) -> list[T]:
-        """What is found at a state, which the model holds before and after, then at the one held."""
-        found = [find()]
-        for other in self.held:
-            self._model.load(other)
-            found.append(find())
+    def _at(self, states: Sequence[State], find: Callable[[], T]) -> list[T]:
+        """What is found at each of some states; the model holds the first of them afterwards."""
+        found = []
+        for state in states[::-1]:
             self._model.load(state)
-        return found
+            found.append(find())
+        return found[::-1]
 
     def _between(self, others: Sequence[Recovered | FittedStress]) -> Measure:
-        """The measure of a cycle to the state held, from its fields; the measure itself where none is."""
+        """The measure of a cycle to another state, from its fields; the measure itself where there is none."""
         return reduce(lambda measure, other: measure.between(other), others, self._measure)
 
     @cached_property
     def _fit(self) -> SurfaceFit | None:
         """On the first process; None elsewhere."""
         return self._recovery.drawn_fit(self._chosen)
+
+
+class _Held(Observable):
+    """The extreme of a cycle as a quantity of one of its states, the other held."""
+
+    def __init__(self, cycle: _Extreme, other: State) -> None:
+        self._cycle, self._other = cycle, other
+
+    def values(self, state):
+        return self._cycle.values(state, self._other)
+
+    def partials(self, system, state):
+        return self._cycle.partials(system, state, self._other)
+
+    def smoothing_errors(self, state):
+        return self._cycle.smoothing_errors(state, self._other)
 
 
 # -- quantities -----------------------------------------------------------------------------------------------------
