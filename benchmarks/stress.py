@@ -32,7 +32,8 @@ HEADERS = (
 def rows(case: Case, space: str) -> Iterator[tuple[object, ...]]:
     """Lines of the table."""
     for size in (case.size, 0.5 * case.size):
-        peak, known = case.solved(space, size)
+        frame, known = case.solved(space, size)
+        peak = frame.peak
         value, name = known.handbook or (known.value, "")
         yield (
             case.name, space.split("-")[0].replace("plane", "plane stress").replace("3d", "3D"), size,

@@ -51,19 +51,22 @@ class Case:
         size: its least width, as large as elements usually are.
         build: in a model, "plane-stress" or "3d-symmetric", the mechanism, its effects, what loads it and how much.
         reference: in a model; of a cantilever, beyond a distance from its clamp.
+        strain: the largest principal strain in plane stress, from the largest stress: where nothing acts on a surface
+            that one is alone.
     """
 
     name: str
     size: float
     build: Callable[[str], tuple[fm.Mechanism, list[fm.Effect], fm.Force | fm.ForceGroup, float]]
     reference: Callable[[str, float], Reference]
+    strain: Callable[[float], float] = lambda stress: stress / E
 
-    def solved(self, space: str, size: float) -> tuple[fm.StressPeak, Reference]:
-        """The peak with elements of ``size``, and its reference."""
+    def solved(self, space: str, size: float) -> tuple[fm.Frame, Reference]:
+        """The frame with elements of ``size``, and the reference of its peak."""
         mechanism, effects, part, force = self.build(space)
         simulation = fm.Simulation(fm.Scene(mechanism, effects), space=space, size=size, comm=MPI.COMM_SELF)
-        peak = simulation.load_displacement(part, forces=[force]).frames[-1].peak
-        return peak, self.reference(space, max(place.reach for place in simulation.singular_places))
+        frame = simulation.load_displacement(part, forces=[force]).frames[-1]
+        return frame, self.reference(space, max(place.reach for place in simulation.singular_places))
 
 
 def between(name, shape, *ends):
@@ -315,11 +318,12 @@ def pressed(_: str):
     return mechanism, [fm.Pressure(link, 1.0, where=bore, about=(0.0, 0.0))], idle, 0.0
 
 
+HOOP = (INNER**2 + OUTER**2) / (OUTER**2 - INNER**2)
+"""At the bore σ_r = −p and σ_θ = p (a² + b²) / (b² − a²), p = 1."""
+
+
 def lame(*_) -> Reference:
-    """At the bore σ_r = −p and σ_θ = p (a² + b²) / (b² − a²)."""
-    a, b = INNER, OUTER
-    hoop = (a**2 + b**2) / (b**2 - a**2)
-    return Reference(math.sqrt(1.0 + hoop + hoop**2), "Lamé")
+    return Reference(math.sqrt(1.0 + HOOP + HOOP**2), "Lamé")
 
 
 # -- all of them ------------------------------------------------------------------------------------------------
@@ -357,5 +361,5 @@ CASES = (
     in_tension("shoulder fillet", filleted_bar, (6.2, 2.0), 4.0, (fillet(1.0 / 3.0), "Peterson")),
     in_tension("U notch", notched_bar, (0.0, 4.0), 8.0, (notch(1.0 / 3.0), "Roark")),
     in_tension("elliptic hole", slotted_plate, (0.0, 2.0), 8.0, (ellipse(1.0 / 3.0), "Roark")),
-    Case("Lamé's tube", OUTER - INNER, pressed, lame),
+    Case("Lamé's tube", OUTER - INNER, pressed, lame, lambda _: (HOOP + NU) / E),
 )

@@ -49,6 +49,7 @@ from fenicsmech.design import (
     fit_law,
     fit_modulus,
     fit_parameters,
+    limits,
 )
 from fenicsmech.effects import (
     Boundary,
@@ -286,7 +287,7 @@ __all__ = [
     "Direct", "TwoLevel", "EquilibriumMethod", "EquilibriumSystem", "EquilibriumPoint", "Control", "State",
     "EquilibriumSolver", "NotConverged",
     # design and characterisation
-    "DesignProblem", "SplineDesign", "ShapeBounds", "Target", "StayClose", "MeshQuality", "Regulariser",
+    "DesignProblem", "SplineDesign", "ShapeBounds", "Target", "limits", "StayClose", "MeshQuality", "Regulariser",
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
     "DesignIterate", "DesignLinearisation",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",

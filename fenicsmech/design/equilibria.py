@@ -18,6 +18,10 @@ v = v̄ + q_v(y°) moves with it:
 
     Q = g(q(y) − q(y°)),     dQ/dp = ∂g/∂q (dq/dp + dq/dv dq_v°/dp − dq°/dp).
 
+A quantity of two samples depends on each with the other held, and what follows from both adds up:
+
+    dQ/dp = ∂Q/∂p + ∂Q/∂y₁ dy₁/dp + ∂Q/∂y₂ dy₂/dp.
+
 Stability is that under the sample's own control: with a prescribed displacement, parts of a path are stable that are
 not under a prescribed force.
 """
@@ -27,6 +31,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 from mpi4py import MPI
@@ -194,9 +200,12 @@ class SampleEquilibria:
         kinds = {target.quantity: target.quantity.on(simulation.model) for target in targets}
         self._observables = [kinds[target.quantity] for target in targets]
         self._at_rest = {k: own for k, own in enumerate(self._observables) if isinstance(own, RestObservable)}
+        # of each component its target, of each target its components
+        self._owners = [k for k, target in enumerate(targets) for _ in range(target.size)]
+        self._places = [[c for c, owner in enumerate(self._owners) if owner == k] for k in range(len(targets))]
         self._paths: dict[Sample, _Path] = {}
-        for sample in dict.fromkeys(target.sample for target in targets if target.sample is not None):
-            counted = [o for o, own in self._of(sample) if self.targets[own].quantity.from_unloaded]
+        for sample in dict.fromkeys(sample for target in targets for sample in target.samples):
+            counted = [kinds[own.quantity] for own in targets if sample in own.samples and own.quantity.from_unloaded]
             self._paths[sample] = _Path(simulation, sample, counted, numbers)
 
     # -- equilibria ----------------------------------------------------------------------------------------------
@@ -273,28 +282,31 @@ class SampleEquilibria:
 
     def gradients(self, solved: DesignEquilibria) -> list[Gradient]:
         """Derivatives of the components at the design that the model holds."""
-        found = {k: [self._shared.sensitivity.at_rest(own)] for k, own in self._at_rest.items()}
+        found: list[list[Gradient]] = [[] for _ in self._owners]
+        for k, observable in self._at_rest.items():
+            found[self._places[k][0]].append(self._shared.sensitivity.at_rest(observable))
         for path in self._paths.values():
-            own = self._of(path.sample)
+            own = self._of(path.sample, solved.samples)
             at = solved.samples[path.sample]
             places, partials = self._partials(solved, path, at.state, own)
             loaded = self._shared.sensitivity.of(path.solver, at.state, at.control, partials)
             if path.moves(at.unloaded):
                 loaded = self._less_unloaded(solved, path, places, loaded)
-            for k, gradient in zip(places, loaded, strict=True):
-                found.setdefault(k, []).append(gradient)
-        return [gradient for k in range(len(self.targets)) for gradient in found[k]]
+            for place, gradient in zip(places, loaded, strict=True):
+                found[place].append(gradient)
+        return [reduce(add, parts) for parts in found]
 
     def errors(self, solved: DesignEquilibria) -> np.ndarray:
         """Estimated discretisation errors of the components, to be added, and those of smoothing, (components,)."""
         with self._model.shaped(solved.design):
-            found = {k: own.smoothing_errors(None).tolist() for k, own in self._at_rest.items()}
+            found = np.zeros(len(self._owners))
+            for k, observable in self._at_rest.items():
+                found[self._places[k]] += observable.smoothing_errors(None)
             for path in self._paths.values():
                 at = solved.samples[path.sample]
-                places, partials = self._partials(solved, path, at.state, self._of(path.sample))
+                places, partials = self._partials(solved, path, at.state, self._of(path.sample, solved.samples))
                 adjoints = self._shared.sensitivity.adjoints(path.solver, at.state, at.control, partials)
                 errors, slopes = self._estimated(adjoints), [own.by_control() if own else 0.0 for own in adjoints]
-                errors = [own + more for own, more in zip(errors, self._smoothing(solved, path), strict=True)]
                 if path.moves(at.unloaded):
                     from_there, counted, prescribed = self._unloaded_partials(solved, path, places)
                     unloaded = self._estimated(
@@ -304,21 +316,29 @@ class SampleEquilibria:
                         errors[place] -= error
                     if prescribed:
                         errors = [own + slope * unloaded[-1] for own, slope in zip(errors, slopes, strict=True)]
-                for k, error in zip(places, errors, strict=True):
-                    found.setdefault(k, []).append(error)
-        return np.array([error for k in range(len(self.targets)) for error in found[k]])
+                found[places] += errors
+                self._add_smoothing(solved, path, found)
+        return found
 
     # -- values and derivatives of one sample --------------------------------------------------------------------
 
-    def _of(self, sample: Sample) -> list[tuple[Observable, int]]:
-        """The observables evaluated at a sample, with the places of their targets."""
-        pairs = enumerate(zip(self.targets, self._observables, strict=True))
-        return [(observable, k) for k, (target, observable) in pairs if target.sample == sample]
+    def _of(self, sample: Sample, states: Mapping[Sample, SampleState]) -> list[tuple[Observable, int]]:
+        """The observables that depend on a sample, the others held in their ``states``, with the places of targets."""
+        found = []
+        for k, (target, observable) in enumerate(zip(self.targets, self._observables, strict=True)):
+            if sample in target.samples:
+                others = (states[own].state for own in target.samples if own != sample)
+                found.append((reduce(lambda own, other: own.holding(other), others, observable), k))
+        return found
+
+    def _evaluated(self, sample: Sample, states: Mapping[Sample, SampleState]) -> list[tuple[Observable, int]]:
+        """Those whose value is taken there: each at one sample."""
+        return [pair for pair in self._of(sample, states) if self.targets[pair[1]].sample == sample]
 
     def _at_design(self, samples: dict[Sample, SampleState]) -> DesignEquilibria:
         raw = {k: np.array([observable.value()]) for k, observable in self._at_rest.items()}
         for sample, at in samples.items():
-            own = self._of(sample)
+            own = self._evaluated(sample, samples)
             counted = [pair for pair in own if self.targets[pair[1]].quantity.from_unloaded]
             for state, pairs, sign in ((at.unloaded, counted, -1.0), (at.state, own, 1.0)):
                 self._model.load(state)
@@ -330,27 +350,27 @@ class SampleEquilibria:
     def _partials(
         self, solved: DesignEquilibria, path: _Path, state: State, own: Sequence[tuple[Observable, int]]
     ) -> tuple[list[int], list[Partial]]:
-        """The partial derivatives of the wanted components at a state, each with the place of its target."""
+        """The partial derivatives of the wanted components at a state, each with its place among all."""
         self._model.load(state)
         places, partials = [], []
         for observable, k in own:
             target = self.targets[k]
             _, slopes = target.quantity.reduce(solved.raw[k])
             parts = observable.partials(path.solver.system, state)
+            places += self._places[k]
             for row in slopes[: target.size]:
-                places.append(k)
                 pairs = zip(row, parts, strict=True)
                 partials.append(sum((float(s) * part for s, part in pairs if s), start=Partial()))
         return places, partials
 
-    def _smoothing(self, solved: DesignEquilibria, path: _Path) -> list[float]:
-        """Errors of smoothing of the wanted components at a path's sample."""
-        found: list[float] = []
-        for observable, k in self._of(path.sample):
+    def _add_smoothing(self, solved: DesignEquilibria, path: _Path, errors: np.ndarray) -> None:
+        """Adds those of smoothing at a path's sample to the errors of the wanted components."""
+        state = solved.samples[path.sample].state
+        self._model.load(state)
+        for observable, k in self._evaluated(path.sample, solved.samples):
             target = self.targets[k]
             _, slopes = target.quantity.reduce(solved.raw[k])
-            found += (slopes[: target.size] @ observable.smoothing_errors(solved.samples[path.sample].state)).tolist()
-        return found
+            errors[self._places[k]] += slopes[: target.size] @ observable.smoothing_errors(state)
 
     def _unloaded_partials(
         self, solved: DesignEquilibria, path: _Path, places: Sequence[int]
@@ -358,9 +378,11 @@ class SampleEquilibria:
         """Partial derivatives in the unloaded configuration: of the components that count from there, then of the
         prescribed displacement; which components these are; and whether a displacement is prescribed.
         """
-        unloaded, quantities = solved.samples[path.sample].unloaded, [self.targets[k].quantity for k in places]
+        unloaded = solved.samples[path.sample].unloaded
+        quantities = [self.targets[self._owners[place]].quantity for place in places]
         counted = [place for place, quantity in enumerate(quantities) if quantity.from_unloaded]
-        own = [pair for pair in self._of(path.sample) if self.targets[pair[1]].quantity.from_unloaded]
+        own = self._of(path.sample, solved.samples)
+        own = [pair for pair in own if self.targets[pair[1]].quantity.from_unloaded]
         _, partials = self._partials(solved, path, unloaded, own)
         if path.moved is not None:
             partials += path.moved.partials(path.solver.system, unloaded)

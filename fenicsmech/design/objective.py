@@ -177,9 +177,10 @@ class Objective:
         group, targets = self._group, self.comparison.targets
         own = on_all(group.everyone, lambda: self._equilibria.whole(self._best.solved))
         # by number: samples of another process are other objects
-        places = {targets[k].sample: k for k in group.mine} if group.leads else {}
+        mine = group.mine if group.leads else ()
+        places = {sample: (k, number) for k in mine for number, sample in enumerate(targets[k].samples)}
         parts = group.everyone.allgather([(places[sample], state) for sample, state in own.items() if places])
-        return {sample: state for part in parts for k, state in part if (sample := targets[k].sample) is not None}
+        return {targets[k].samples[number]: state for part in parts for (k, number), state in part}
 
     def sensitivities(self) -> np.ndarray:
         """Relative change of each component when a parameter changes by its length ℓ, (components, parameters)."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -108,6 +109,8 @@ class Target:
                 f"its sample is {sample!r}",
                 "Give Sample(…)" if quantity.of_state else "Leave it out: links at rest have one shape",
             )
+        if sample is not None and sample == quantity.since:
+            raise DescriptionError(part, f"both of its samples are {sample}", "Give two that differ")
         set_fields(
             self,
             quantity=quantity,
@@ -117,6 +120,11 @@ class Target:
             weight=positive(f"weight of a target for the {quantity}", weight),
             scale=None if scale is None else positive(f"scale of the {part}", scale),
         )
+
+    @property
+    def samples(self) -> tuple[Sample, ...]:
+        """The equilibria that the quantity depends on: its sample, then the other one of a cycle; none at rest."""
+        return tuple(own for own in (self.sample, self.quantity.since) if own is not None)
 
     @property
     def size(self) -> int:
@@ -152,6 +160,35 @@ class Target:
         if self.quantity != Displacement(force) or not isinstance(magnitude, float):
             return None
         return force, magnitude, self.wanted[0], self.sample.configuration
+
+
+def limits(
+    quantity: Quantity,
+    samples: Iterable[Sample | Target],
+    *,
+    at_most: Numbers | None = None,
+    at_least: Numbers | None = None,
+    scale: float | None = None,
+) -> tuple[Target, ...]:
+    """One limit at several samples, over a motion for instance: a target for each.
+
+        targets=[*targets, *limits(LargestStress(), targets, at_most=30.0)]
+        targets=[*targets, *limits(LeastGap(left, right), motion, at_least=1.0)]
+
+    Args:
+        quantity: what is limited; that of a cycle in the cycles from its own sample to each of these.
+        samples: where, each once; of targets theirs, so that all targets of a problem stand for all its equilibria.
+        at_most, at_least: the bound.
+        scale: to which errors are relative, see ``Target``.
+
+    Raises:
+        DescriptionError: there is no sample, or not exactly one bound.
+    """
+    given = (own.samples if isinstance(own, Target) else (own,) for own in samples)
+    found = [sample for sample in dict.fromkeys(chain.from_iterable(given)) if sample != quantity.since]
+    if not found:
+        raise DescriptionError(f"limits of the {quantity}", "there is no sample", "Give samples, or targets with some")
+    return tuple(Target(quantity, own, at_most=at_most, at_least=at_least, scale=scale) for own in found)
 
 
 class Comparison:
@@ -295,9 +332,9 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
     dim = simulation.linkage.dim
     for target in targets:
         expect("design problem", target, Target, "a target", "Give Target(…)")
-        if target.sample is not None:
-            sample_request(simulation, target.sample, [target.sample.value])
-            on_one(simulation.comm, partial(assemble, simulation.linkage, target.sample.configuration))
+        for sample in target.samples:
+            sample_request(simulation, sample, [sample.value])
+            on_one(simulation.comm, partial(assemble, simulation.linkage, sample.configuration))
         target.check(simulation.scene, dim)
         if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
             moved = target.sample.moved

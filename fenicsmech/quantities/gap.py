@@ -33,7 +33,7 @@ class LeastGap(Quantity):
         Target(LeastGap(left, right), sample, at_least=1.0)
         Target(LeastGap(left, Cylinder((20, 30), 5.0)), sample, at_least=1.0)
 
-    It is negative by the penetration where outlines overlap. A limit over a motion is one target for each sample of it.
+    It is negative by the penetration where outlines overlap. ``limits`` holds it over the samples of a motion.
     In space it is that of the faces of greatest z, seen along z.
 
     Attributes:

@@ -40,6 +40,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import JointChange
+from fenicsmech.quantities.sample import Sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +101,10 @@ class Observable(ABC):
     def partials(self, system: EquilibriumSystem, state: State) -> list[Partial]:
         """The derivatives of each component at a state of ``system``."""
 
+    def holding(self, other: State) -> Observable:
+        """The quantity of two states as one of either of them, ``other`` held."""
+        raise NotImplementedError(f"{type(self).__name__} is of one state")
+
     def smoothing_errors(self, state: State | None) -> np.ndarray:
         """What the true extreme adds to each value where that is a smooth one in its place, (size,); 0 by default."""
         return np.zeros(self.size)
@@ -156,6 +161,11 @@ class Quantity(ABC):
     def material_points(self) -> tuple[MaterialPoint, ...]:
         """The points of links that it refers to by their drawn places; none by default."""
         return ()
+
+    @property
+    def since(self) -> Sample | None:
+        """A second sample that it depends on, in the same way, as a cycle between two does; None by default."""
+        return None
 
     def of_part(self, links: Collection[FlexibleLink]) -> bool:
         """Whether parts that are known by their outline alone, in place of ``links``, have it; by default they do."""

@@ -354,7 +354,7 @@ class Curve:
         end: Sequence[float] | None = None,
         frame: Frame | None = None,
     ) -> EdgeStress:
-        """The recovered stress along the outline of a flexible link, at mid-depth in space, for plots and as data.
+        """Recovered stress and strain along the outline of a flexible link, at mid-depth in space: a plot and data.
 
         Args:
             link: the link.

@@ -19,7 +19,6 @@ from fenicsmech.stress import (
     StressPeak,
     StressRecovery,
     SurfacePeaks,
-    check_allowables,
     life_between,
     safety_of,
 )
@@ -80,9 +79,26 @@ class Frame:
         """The peak of each flexible link, by its name; one evaluation serves all of them."""
         return {peak.link: peak for peak in self._peaks.links}
 
+    @property
+    def strain_peak(self) -> StressPeak:
+        """The largest principal nominal strain λ₁ − 1 of the elastic deformation, what allowable strains limit.
+
+        It is one at the surface of flexible links too, with the same places left out. The first read is collective.
+        """
+        return self._strain_peaks.whole
+
+    @property
+    def strain_peaks(self) -> Mapping[str, StressPeak]:
+        """That of each flexible link, by its name; one evaluation serves all of them."""
+        return {peak.link: peak for peak in self._strain_peaks.links}
+
     @cached_property
     def _peaks(self) -> SurfacePeaks:
         return self.stresses.peaks(self.state, self.design)
+
+    @cached_property
+    def _strain_peaks(self) -> SurfacePeaks:
+        return self.stresses.strain_peaks(self.state, self.design)
 
     @property
     def safety(self) -> Safety:
@@ -91,8 +107,7 @@ class Frame:
         Raises:
             DescriptionError: no material has an allowable stress or strain.
         """
-        check_allowables(self.stresses.materials)
-        return safety_of(self._peaks, self.stresses.materials)
+        return safety_of(self.stresses.materials, lambda own: self.strain_peaks if own.is_strain else self.peaks)
 
     @cached_property
     def law_stability(self) -> Mapping[str, LawStability]:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenicsmech.stress.recovered import undeformed
 from fenicsmech.stress.recovery import PatchRecovery, with_image
 
 
@@ -50,8 +51,10 @@ class SurfaceFit:
         stress, F = _square(own[..., :9]), _square(own[..., 9 : 9 + dim**2])
         T = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.solve(F, stress[..., :dim, :dim]), -1, -2)
         across = stress[..., 2, 2, None]
-        fits = self.recovery.fit(T, np.concatenate([across, own[..., 9:]], axis=2))
+        rest = undeformed(own.shape[-1], dim)
+        fits = self.recovery.fit(T, np.concatenate([across, own[..., 9:] - rest], axis=2))
         found = np.concatenate([self._at(part.reshape(*part.shape[:2], -1)) for part in fits], axis=2)
+        found[..., dim**2 + 1 :] += rest
         return FittedStress(self, samples.shape, T, F, np.delete(found, dim**2, axis=2), found[..., dim**2])
 
     def _at(self, coefficients: np.ndarray) -> np.ndarray:
@@ -71,6 +74,7 @@ class FittedStress:
 
     Attributes:
         stress: σ*, (facets, p, 3, 3).
+        F: F̂*, (facets, p, dim, dim).
         elastic: the elastic part of F, (facets, p, dim, dim), if there were samples of it.
     """
 
@@ -86,20 +90,20 @@ class FittedStress:
         dim = F.shape[-1]
         self._fit, self._shape, self._sampled = fit, shape, (T, F)
         T, F, *elastic = (_square(own) for own in np.split(found, found.shape[-1] // dim**2, axis=2))
-        self._fitted = T, F
+        self._fitted, self.F = T, F
         plane = T @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None]
         self.stress = np.zeros((*found.shape[:2], 3, 3))
         self.stress[..., 2, 2] = across
         self.stress[..., :dim, :dim] = _symmetric(plane)
         self.elastic = elastic[0] if elastic else None
 
-    def transposed(self, stress: np.ndarray, elastic: np.ndarray | None) -> np.ndarray:
-        """Derivatives by the samples, in their shape, from those by ``stress`` and ``elastic``."""
-        (T, F), dim = self._fitted, self._sampled[0].shape[-1]
+    def transposed(self, stress: np.ndarray, through_F: np.ndarray | float, elastic: np.ndarray | None) -> np.ndarray:
+        """Derivatives by the samples, in their shape, from those by ``stress``, ``F`` and ``elastic``."""
+        T, F, dim = self._fitted, self.F, self._sampled[0].shape[-1]
         by_stress, J = _symmetric(stress[..., :dim, :dim]), np.linalg.det(F)[..., None, None]
         by_T = by_stress @ F / J
         traces = np.einsum("...ij,...ij->...", by_stress, self.stress[..., :dim, :dim])[..., None, None]
-        by_F = by_stress @ T / J - traces * _inverse_transposed(F)
+        by_F = through_F + by_stress @ T / J - traces * _inverse_transposed(F)
         across = stress[..., 2, 2, None] if dim == 2 else np.zeros((*stress.shape[:2], 1))
         others = [across, _flat(by_F), *([] if elastic is None else [_flat(elastic)])]
         fits = self._fit.transposed(_flat(by_T)), self._fit.transposed(np.concatenate(others, axis=2))

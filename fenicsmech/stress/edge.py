@@ -1,7 +1,11 @@
-"""Recovered stress along the edge of a link: its outline in the plane, at mid-depth in space.
+"""Recovered stress and strain along the edge of a link: its outline in the plane, at mid-depth in space.
 
-With the tangent t of the deformed edge, the stress along it is t · σ t. Where nothing acts on an edge no other one is
-left in the plane, and the von Mises stress is its modulus.
+With the tangents T of the edge at rest and t of the deformed one, both of length 1, and the elastic part F_e of F,
+
+    σ = t · σ t,     ε = |F T| / |F_e⁻¹ F T| − 1.
+
+Where nothing acts on an edge no other stress is left in the plane, and the von Mises stress is the modulus of that
+along it. The strain is what a gauge along the edge shows, growth without stress left out.
 """
 
 from __future__ import annotations
@@ -31,7 +35,7 @@ _PARTS = 4  # of each side of a cell
 
 @dataclass(frozen=True, eq=False)
 class EdgeStress:
-    """Stress along the edge of a link, NaN where a joint holds it.
+    """Stress and strain along the edge of a link, NaN where a joint holds it.
 
     Attributes:
         link: its name.
@@ -40,6 +44,8 @@ class EdgeStress:
         along: t · σ t, tension positive, (n,).
         error: estimated, of ``along``, (n,).
         von_mises: von Mises stress, (n,).
+        strain: nominal, of the elastic deformation along the edge, (n,).
+        strain_error: estimated, of ``strain``, (n,).
         singular: within reach of a singular place, where stress has no limit, (n,).
         outline: closed polygons of the link at rest, in the plane, (k, 2) each.
         units: of the scene.
@@ -52,6 +58,8 @@ class EdgeStress:
     along: np.ndarray
     error: np.ndarray
     von_mises: np.ndarray
+    strain: np.ndarray
+    strain_error: np.ndarray
     singular: np.ndarray
     outline: tuple[np.ndarray, ...]
     units: Units
@@ -77,7 +85,8 @@ class EdgeStress:
         axes = {f"{name} [{length}]": values for name, values in zip("xyz", self.points.T, strict=False)}
         columns = {
             f"arc length [{length}]": self.arc_length, **axes, f"along the edge [{stress}]": self.along,
-            f"error [{stress}]": self.error, f"von Mises [{stress}]": self.von_mises, "singular": self.singular,
+            f"error [{stress}]": self.error, f"von Mises [{stress}]": self.von_mises,
+            "strain along the edge": self.strain, "error of the strain": self.strain_error, "singular": self.singular,
         }  # fmt: skip
         on_one(self.comm, lambda: write_csv(path, {name: values[known] for name, values in columns.items()}))
 
@@ -119,19 +128,19 @@ def edge_stress(
     order, arc_length = line.between(start, end)
 
     def along(found: Recovered) -> np.ndarray:
-        """t · σ t, (n,)."""
+        """Stress and strain along the edge, (2, n)."""
+        assert found.elastic is not None, "strains are recovered with it"
         t = np.einsum("nij,nj->ni", found.F[:, 0], line.tangents)
-        t /= np.linalg.norm(t, axis=1, keepdims=True)
-        dim = t.shape[1]
-        return np.einsum("ni,nij,nj->n", t, found.stress[:, 0, :dim, :dim], t)
+        free = np.linalg.solve(found.elastic[:, 0], t[..., None])[..., 0]
+        length, dim = np.linalg.norm(t, axis=1), t.shape[1]
+        stress = np.einsum("ni,nij,nj->n", t, found.stress[:, 0, :dim, :dim], t) / length**2
+        return np.stack([stress, length / np.linalg.norm(free, axis=1) - 1.0])
 
-    found, error = surface.errors(fields, line.cells, line.corners[:, None], along)
-    stress = along(found)
-    held = ~surface.mesh[3][line.cells]
-    equivalent = von_mises(found.stress[:, 0])
-    for values in (stress, error, equivalent):
-        values[held] = np.nan
-    singular = np.zeros(len(held), dtype=bool)
+    found, errors, (recovered,) = surface.errors([fields], line.cells, line.corners[:, None], along)
+    values = np.stack([*found, *errors, von_mises(recovered.stress[:, 0])])
+    values[:, ~surface.mesh[3][line.cells]] = np.nan
+    stress, strain, error, strain_error, equivalent = values[:, order]
+    singular = np.zeros(len(line.cells), dtype=bool)
     for place in surface.places:
         if place.link == name:
             singular |= place.holds(line.drawn)
@@ -139,9 +148,11 @@ def edge_stress(
         "link": name,
         "arc_length": arc_length,
         "points": line.points[order],
-        "along": stress[order],
-        "error": error[order],
-        "von_mises": equivalent[order],
+        "along": stress,
+        "error": error,
+        "von_mises": equivalent,
+        "strain": strain,
+        "strain_error": strain_error,
         "singular": singular[order],
         "outline": tuple(own.points[:, :2] for own in loops),
     }

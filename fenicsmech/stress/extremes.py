@@ -14,9 +14,9 @@ Derivatives: with the weights w = ∂Q/∂τ of the samples τ = (σ, F̂, F_e),
 
     ∂Q/∂y = ∂/∂y ∫ w · τ(u, s) dX₀
 
-over the quadrature whose points the samples are, a form. Source of the norm: P. Duysinx, M. P. Bendsøe, Topology
-optimization of continuum structures with local stress constraints
-(doi:10.1002/(SICI)1097-0207(19981230)43:8<1453::AID-NME480>3.0.CO;2-2).
+over the quadrature whose points the samples are, a form. The life of cycles between two equilibria has one by each,
+the other held. Source of the norm: P. Duysinx, M. P. Bendsøe, Topology optimization of continuum structures with local
+stress constraints (doi:10.1002/(SICI)1097-0207(19981230)43:8<1453::AID-NME480>3.0.CO;2-2).
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial, reduce
+from typing import TypeVar
 
 import numpy as np
 import ufl
@@ -32,14 +33,18 @@ from dolfinx import fem
 
 from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import cell_dofs, cell_nodes, compile_expression, evaluate_expression, quadrature_space
-from fenicsmech.errors import DescriptionError, finite, positive, set_fields
+from fenicsmech.equilibrium import State
+from fenicsmech.errors import DescriptionError, expect, finite, positive, set_fields
 from fenicsmech.mechanism import Allowable, Material, Scene
 from fenicsmech.model import MechanismModel
-from fenicsmech.quantities import FormValue, Observable, OfLinks, Partial
+from fenicsmech.quantities import FormValue, Observable, OfLinks, Partial, Sample
 from fenicsmech.stress.drawn import FittedStress, SurfaceFit
 from fenicsmech.stress.measures import Fatigue, Measure, Strain, Stress, Utilisation
 from fenicsmech.stress.peak import StressRecovery
+from fenicsmech.stress.recovered import Recovered
 from fenicsmech.stress.surface import StressOptions
+
+T = TypeVar("T")
 
 SHARPNESS = 100.0
 """Default p: values within 1 % of the largest one count. With 50 the claw's design takes 40 % more evaluations."""
@@ -140,7 +145,7 @@ class _Smooth:
 
 
 class _Extreme(Observable):
-    """The quantity of the largest value of a measure on some links of one model.
+    """The quantity of the largest value of a measure on some links of one model, at a state or in a cycle to another.
 
     Args:
         model: with the links.
@@ -165,12 +170,15 @@ class _Extreme(Observable):
         self._comm, self._recovery = model.mesh.comm, recovery
         self._samples = _Samples(model, measure.strained)
 
-    def values(self, state):
-        found = self._smooth()
+    def holding(self, other):
+        return _Held(self, other)
+
+    def values(self, state, *others):
+        found = self._smooth(state, *others)
         return np.array([self._comm.bcast(None if found is None else found.value, root=0)])
 
-    def partials(self, system, state):
-        found = self._smooth()
+    def partials(self, system, state, *others):
+        found = self._smooth(state, *others)
         weights = on_one(self._comm, lambda: None if found is None else found.by_samples())
         self._samples.weigh(self._recovery.scattered(weights))
         form = self._samples.form
@@ -182,43 +190,76 @@ class _Extreme(Observable):
             )
         ]
 
-    def smoothing_errors(self, state):
-        return np.array([self._true()]) - self.values(state)
+    def smoothing_errors(self, state, *others):
+        return np.array([self._true(state, *others)]) - self.values(state, *others)
 
-    def _smooth(self) -> _Smooth | None:
-        """At the state that the model holds, on the first process; None elsewhere."""
+    def _smooth(self, *states: State) -> _Smooth | None:
+        """At a state, or in the cycle from it to another one, on the first process; None elsewhere."""
         fit, surface = self._fit, self._recovery.surface
         with self._model.clock.phase("stress"):
-            samples = self._recovery.gathered(self._samples.values())
+            samples = self._at(states, lambda: self._recovery.gathered(self._samples.values()))
 
             def find() -> _Smooth:
-                assert fit is not None and surface is not None and samples is not None  # on the first process
+                assert fit is not None and surface is not None  # on the first process
                 links, kept = surface.links[fit.facets], surface.kept[fit.facets]
-                return _Smooth.of(fit.of(samples), links, kept, self._measure, self._sharpness)
+                own, *others = (fit.of(found) for found in samples if found is not None)
+                return _Smooth.of(own, links, kept, self._between(others), self._sharpness)
 
             return on_one(self._comm, find)
 
-    def _true(self) -> float:
-        """The quantity of the largest value recovered at the links at rest, on the safe side."""
+    def _true(self, *states: State) -> float:
+        """The quantity of the largest value recovered at the links at rest, on the safe side; arguments as there."""
         surface = self._recovery.surface
         with self._model.clock.phase("stress"):
-            fields = self._recovery.present(strains=self._measure.strained)
+            fields = self._at(states, lambda: self._recovery.present(strains=self._measure.strained))
+
+            def measured(links: np.ndarray, own: Recovered, *others: Recovered) -> np.ndarray:
+                return self._between(others).values(own, links)
 
             def find() -> float:
-                assert surface is not None and fields is not None  # on the first process
+                assert surface is not None  # on the first process
+                present = [own for own in fields if own is not None]
                 counts = surface.kept & self._chosen[surface.links][:, None]
-                values = np.where(counts, self._measure.values(surface.recovered(fields), surface.links), -np.inf)
+                found = measured(surface.links, *(surface.recovered(own) for own in present))
+                values = np.where(counts, found, -np.inf)
                 facet, point = (int(k) for k in np.unravel_index(np.argmax(values), values.shape))
-                link = surface.links[[facet]]
-                error = surface.error(fields, facet, point, lambda own: self._measure.values(own, link))
+                error = surface.error(present, facet, point, partial(measured, surface.links[[facet]]))
                 return self._measure.total(float(values[facet, point]) + self._margin * error)[0]
 
             return from_one(self._comm, find)
+
+    def _at(self, states: Sequence[State], find: Callable[[], T]) -> list[T]:
+        """What is found at each of some states; the model holds the first of them afterwards."""
+        found = []
+        for state in states[::-1]:
+            self._model.load(state)
+            found.append(find())
+        return found[::-1]
+
+    def _between(self, others: Sequence[Recovered | FittedStress]) -> Measure:
+        """The measure of a cycle to another state, from its fields; the measure itself where there is none."""
+        return reduce(lambda measure, other: measure.between(other), others, self._measure)
 
     @cached_property
     def _fit(self) -> SurfaceFit | None:
         """On the first process; None elsewhere."""
         return self._recovery.drawn_fit(self._chosen)
+
+
+class _Held(Observable):
+    """The extreme of a cycle as a quantity of one of its states, the other held."""
+
+    def __init__(self, cycle: _Extreme, other: State) -> None:
+        self._cycle, self._other = cycle, other
+
+    def values(self, state):
+        return self._cycle.values(state, self._other)
+
+    def partials(self, system, state):
+        return self._cycle.partials(system, state, self._other)
+
+    def smoothing_errors(self, state):
+        return self._cycle.smoothing_errors(state, self._other)
 
 
 # -- quantities -----------------------------------------------------------------------------------------------------
@@ -343,19 +384,32 @@ class LeastLife(_ExtremeOfLinks):
     """The decimal logarithm of the fewest cycles to failure between no stress and the sample, by Basquin and Goodman.
 
         Target(LeastLife(), grasp, at_least=6.0)  # 10⁶ cycles
+        Target(LeastLife(since=released), grasp, at_least=6.0)
 
+    With ``since`` cycles are those between two samples, as of ``frame.life(other)``: two loads, or two configurations.
     Compressive mean stress counts as zero, an endurance limit not at all: the line of Basquin goes on. Goodman's line
     goes on along its tangent where the mean stress is within a tenth of the ultimate stress, or above it.
 
     Attributes:
         links: a flexible link or several; by default all whose materials have an ultimate stress and a line of Basquin.
         sharpness, margin, options: as those of ``LargestStress``.
+        since: the other sample of the cycle, its force or configuration another one; by default no stress.
 
     Raises:
-        DescriptionError: as there; later: a link's material lacks one of these, or no link is stressed.
+        DescriptionError: as there, or ``since`` is not a sample; later: a link's material lacks one of these, or no
+            link is stressed.
     """
 
+    since: Sample | None = None
     what = "least life"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expect(self.what, self.since, Sample | None, "a sample", "Give since=Sample(…)")
+
+    @property
+    def name(self):
+        return super().name if self.since is None else f"{super().name} in cycles from {self.since}"
 
     def unit(self, units):
         return "decades"

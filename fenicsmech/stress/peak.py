@@ -1,4 +1,4 @@
-"""Recovered stress at the surface of flexible links, and its peak.
+"""Recovered stress and strain at the surface of flexible links, and their peaks.
 
 Samples of all processes are gathered on one, which fits the polynomials: results are those of one process.
 """
@@ -41,16 +41,22 @@ class StressRecovery:
         self._model, self._options = model, options or StressOptions()
 
     def peaks(self, state: State, design: Design) -> SurfacePeaks:
-        """The peaks at an equilibrium; of strains too if a material is limited by one."""
-        surface = self.surface
-        strengths = [material.strength for material in self._model.materials]
-        limits = [strength.allowable for strength in strengths if strength is not None]
-        strains = any(limit is not None and limit.is_strain for limit in limits)
-        fields = self._fields(state, design, strains=strains)
+        """The peaks of the von Mises stress at an equilibrium."""
+        surface, fields = self.surface, self._fields(state, design)
 
         def find() -> SurfacePeaks:
             assert surface is not None and fields is not None  # on the first process
             return surface.peaks(fields)
+
+        return from_one(self._model.mesh.comm, find)
+
+    def strain_peaks(self, state: State, design: Design) -> SurfacePeaks:
+        """The peaks of the largest principal nominal strain of the elastic deformation at an equilibrium."""
+        surface, fields = self.surface, self._fields(state, design, strains=True)
+
+        def find() -> SurfacePeaks:
+            assert surface is not None and fields is not None  # on the first process
+            return surface.strain_peaks(fields)
 
         return from_one(self._model.mesh.comm, find)
 
@@ -93,8 +99,9 @@ class StressRecovery:
         start: np.ndarray | None = None,
         end: np.ndarray | None = None,
     ) -> EdgeStress:
-        """The stress along the edge of a link, see ``Curve.edge_stress``."""
-        surface, fields, number = self.surface, self._fields(state, design), list(self.materials).index(link)
+        """Stress and strain along the edge of a link, see ``Curve.edge_stress``."""
+        surface, number = self.surface, list(self.materials).index(link)
+        fields = self._fields(state, design, strains=True)
 
         def find() -> dict[str, Any]:
             assert surface is not None and fields is not None  # on the first process

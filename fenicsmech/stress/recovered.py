@@ -49,6 +49,22 @@ class Recovered:
         return principal_strain(self.elastic)
 
 
+def undeformed(size: int, dim: int) -> np.ndarray:
+    """F and, if it counts, its elastic part where nothing deforms, as in samples of ``size`` 9 + dim² or 9 + 2 dim².
+
+    Fits take the difference from it: their ridge is small beside the values fitted, not beside strains of 1e-7.
+    """
+    return np.tile(np.eye(dim).ravel(), (size - 9) // dim**2)
+
+
+def turned_back(stress: np.ndarray, F: np.ndarray) -> np.ndarray:
+    """Rᵀ σ R of stresses (…, 3, 3), with the rotation R of F = R U, (…, d, d), (…, 3, 3)."""
+    R, dim = np.broadcast_to(np.eye(3), stress.shape).copy(), F.shape[-1]
+    left, _, right = np.linalg.svd(F)
+    R[..., :dim, :dim] = left @ right
+    return np.swapaxes(R, -1, -2) @ stress @ R
+
+
 def von_mises(stress: np.ndarray) -> np.ndarray:
     """√(3/2 dev σ : dev σ) of stresses (…, 3, 3), (…,)."""
     deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3.0 * np.eye(3)

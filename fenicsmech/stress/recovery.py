@@ -7,8 +7,8 @@ fitted to the values at these points in the patch of v,
     Σ_s g_s |T(X_s) − T_v(X_s)|² + w² Σ_b g_b |T_v(X_b) N_b|² → min,     T = J σ F⁻ᵀ,     g = exp(−a |X − X_v|² / R²),
 
 R the radius of the patch, with X_b and N_b points and normals of the free boundary at rest, where σ n = 0 is T N = 0 at
-any deformation. Each row of T is fitted by itself, all with one matrix. F is fitted in the same way without boundary
-terms. Between vertices
+any deformation. Each row of T is fitted by itself, all with one matrix. F − I is fitted in the same way without
+boundary terms. Between vertices
 
     T*(X) = Σ_v λ_v(X) T_v(X),     σ* = T* F*ᵀ / det F*,
 

@@ -8,12 +8,12 @@ with the von Mises stress and the largest principal nominal strain recovered at 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from fenicsmech.errors import DescriptionError, point_text
 from fenicsmech.mechanism import Allowable, Material
-from fenicsmech.stress.surface import StressPeak, SurfacePeaks
+from fenicsmech.stress.surface import StressPeak
 
 
 @dataclass(frozen=True)
@@ -119,19 +119,18 @@ def check_allowables(materials: Mapping[str, Material]) -> None:
         )
 
 
-def safety_of(peaks: SurfacePeaks, materials: Mapping[str, Material]) -> Safety:
-    """The factor of safety from the peaks of an equilibrium.
+def safety_of(materials: Mapping[str, Material], peaks: Callable[[Allowable], Mapping[str, StressPeak]]) -> Safety:
+    """The factor of safety at an equilibrium.
+
+    Args:
+        materials: of the flexible links, by their names.
+        peaks: of stress or strain, whichever is compared with an allowable, by names of links.
 
     Raises:
         DescriptionError: no material has an allowable.
     """
     check_allowables(materials)
     known = allowables(materials)
-    stresses, strains = ({peak.link: peak for peak in own} for own in (peaks.links, peaks.strains))
-    links = [
-        LinkSafety(own, (strains if own.is_strain else stresses)[name])
-        for name, own in known.items()
-        if name in stresses
-    ]
+    links = [LinkSafety(own, found[name]) for name, own in known.items() if name in (found := peaks(own))]
     links.sort(key=lambda link: link.factor)
     return Safety(tuple(links), tuple(name for name in materials if name not in known))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from fenicsmech.mechanism import Disc, Face, Force
 from fenicsmech.model import MechanismModel
 from fenicsmech.stress.drawn import SurfaceFit
 from fenicsmech.stress.interpolation import InterpolationError, InterpolationOptions, node_places
-from fenicsmech.stress.recovered import CellFields, Recovered, principal_strain, von_mises
+from fenicsmech.stress.recovered import CellFields, Recovered, principal_strain, turned_back, undeformed, von_mises
 from fenicsmech.stress.recovery import PatchRecovery, RecoveryOptions, Samples, shape_functions, with_image
 from fenicsmech.stress.recovery_error import HIGHER, SMOOTHER, recovery_error
 from fenicsmech.stress.singular_places import (
@@ -51,14 +51,14 @@ class StressOptions:
 
 @dataclass(frozen=True)
 class StressPeak:
-    """The largest von Mises stress at the surface of flexible links, singular places left out.
+    """The largest stress or strain at the surface of flexible links, singular places left out.
 
     Attributes:
-        value: the stress.
+        value: the von Mises stress, or the largest principal nominal strain of the elastic deformation.
         error: estimated, of the value.
         place: point of the unloaded link, (dim,).
         link: name of the link.
-        left_out: names of singular places near which the stress is above the peak. Where they hold the whole surface
+        left_out: names of singular places near which it is above the peak. Where they hold the whole surface
             of the link, the value is one within them, without a limit, and all are named: smaller elements make room.
     """
 
@@ -74,17 +74,15 @@ class StressPeak:
 
 @dataclass(frozen=True)
 class SurfacePeaks:
-    """Peaks of one equilibrium.
+    """Peaks of stress, or of strain, at one equilibrium.
 
     Attributes:
         whole: the largest of all links.
         links: of each flexible link that has a surface, in their order.
-        strains: likewise, of the largest principal nominal strain of the elastic deformation; empty if not asked for.
     """
 
     whole: StressPeak
     links: tuple[StressPeak, ...]
-    strains: tuple[StressPeak, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -414,10 +412,12 @@ class LinkSurface:
         )
         # T = J σ F⁻ᵀ
         T = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.solve(F, stress[..., :dim, :dim]), -1, -2)
-        others = np.concatenate([stress[..., 2, 2, None], values[..., 9:]], axis=2)
+        rest = undeformed(values.shape[-1], dim)
+        others = np.concatenate([stress[..., 2, 2, None], values[..., 9:] - rest], axis=2)
         T, others = recovery.fit(T, others)
         coefficients = np.concatenate([T.reshape(*T.shape[:2], -1), others], axis=2)
         found = sum(shares[:, corner] @ coefficients[rows[:, corner]] for corner in range(rows.shape[1]))
+        found[..., dim * dim + 1 :] += rest
         across = found[..., dim * dim]
         T, F, *elastic = (
             own.reshape(*own.shape[:2], dim, dim)
@@ -473,36 +473,48 @@ class LinkSurface:
         return self._blended(body.recovery, fields.samples, body.rows, body.shares, body.points)
 
     def errors(
-        self, fields: CellFields, cells: np.ndarray, corners: np.ndarray, measure: Callable[[Recovered], np.ndarray]
-    ) -> tuple[Recovered, np.ndarray]:
-        """Recovered fields, arguments as of ``at``, and estimated errors of a measure of them."""
-        found = self.at(fields, cells, corners)
-        smoother, higher = (measure(self.at(fields, cells, corners, own)) for own in (SMOOTHER, HIGHER))
-        return found, recovery_error(measure(found), smoother, higher, self._model.elastic.order)
+        self, fields: Sequence[CellFields], cells: np.ndarray, corners: np.ndarray, measure: Callable[..., np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, list[Recovered]]:
+        """A measure of the fields recovered at some equilibria, its estimated errors, and these fields.
 
-    def error(self, fields: CellFields, facet: int, point: int, measure: Callable[[Recovered], np.ndarray]) -> float:
-        """Estimated error of a measure of recovered fields at one of the points of the surface."""
+        Args:
+            fields: of each equilibrium.
+            cells, corners: as of ``at``.
+            measure: of the fields recovered at all of them.
+        """
+        found, smoother, higher = (
+            [self.at(own, cells, corners, variant) for own in fields] for variant in ((0, 1.0), SMOOTHER, HIGHER)
+        )
+        value = measure(*found)
+        return value, recovery_error(value, measure(*smoother), measure(*higher), self._model.elastic.order), found
+
+    def error(self, fields: Sequence[CellFields], facet: int, point: int, measure: Callable[..., np.ndarray]) -> float:
+        """The estimated error of a measure, as in ``errors``, at one of the points of the surface."""
         cells, corners = self._meshed.cells[[facet]], self._candidates[0][[facet], [[point]]]
         return float(self.errors(fields, cells, corners, measure)[1].item())
 
     def peaks(self, fields: CellFields) -> SurfacePeaks:
-        """The peaks at an equilibrium, of strains too if there are samples of the elastic part of F."""
-        found, dim, facets = self.recovered(fields), self._model.elastic.model.dim, self.links
-        samples = fields.samples
+        """The peaks of the von Mises stress at an equilibrium."""
         # in fits to both sides of a corner the stress vanishes there: samples tell
-        sampled = von_mises(samples[..., :9].reshape(*samples.shape[:2], 3, 3)).max(axis=1)
-        stressed = _Looked(fields, found, Recovered.von_mises, sampled)
-        masks = [mask for number in range(int(facets.max()) + 1) if (mask := facets == number).any()]
-        strains: tuple[StressPeak, ...] = ()
-        if found.elastic is not None:
-            free = self._flexible[: len(samples)]
-            stretched = samples[..., 9 + dim**2 :].reshape(*samples.shape[:2], dim, dim)[free]
-            largest = np.zeros(len(samples))
-            largest[free] = principal_strain(stretched).max(axis=1)
-            strained = _Looked(fields, found, Recovered.principal_strain, largest)
-            strains = tuple(self._peak(strained, mask) for mask in masks)
-        links = tuple(self._peak(stressed, mask) for mask in masks)
-        return SurfacePeaks(self._peak(stressed, np.ones(len(facets), dtype=bool)), links, strains)
+        stresses = fields.samples[..., :9].reshape(*fields.samples.shape[:2], 3, 3)
+        return self._peaks(fields, Recovered.von_mises, von_mises(stresses).max(axis=1))
+
+    def strain_peaks(self, fields: CellFields) -> SurfacePeaks:
+        """The peaks of the largest principal strain, from fields with the elastic part of F."""
+        dim, samples = self._model.elastic.model.dim, fields.samples
+        free = self._flexible[: len(samples)]
+        elastic = samples[free][..., 9 + dim**2 :]
+        sampled = np.zeros(len(samples))
+        sampled[free] = principal_strain(elastic.reshape(*elastic.shape[:2], dim, dim)).max(axis=1)
+        return self._peaks(fields, Recovered.principal_strain, sampled)
+
+    def _peaks(
+        self, fields: CellFields, measure: Callable[[Recovered], np.ndarray], sampled: np.ndarray
+    ) -> SurfacePeaks:
+        """Those of a measure, whose largest sample in each cell is ``sampled``."""
+        looked, links = _Looked(fields, self.recovered(fields), measure, sampled), self.links
+        own = tuple(self._peak(looked, links == number) for number in np.unique(links))
+        return SurfacePeaks(self._peak(looked, np.ones(len(links), dtype=bool)), own)
 
     def _peak(self, looked: _Looked, mask: np.ndarray) -> StressPeak:
         """The peak on the facets of ``mask``."""
@@ -521,20 +533,16 @@ class LinkSurface:
             if largest > value or (not room and own.any())
         ]
         link = links[self._link[self._meshed.cells[facet]]]
-        error = self.error(looked.fields, facet, point, looked.measure)
+        error = self.error([looked.fields], facet, point, looked.measure)
         place = tuple(looked.found.points[facet, point].tolist())
         return StressPeak(value, error, place, link.name, tuple(above))
 
     def stress(self, fields: CellFields) -> SurfaceStress:
         """The recovered stress at an equilibrium, turned back with the material."""
         fields = self.whole(fields)
-        body, dim = self._body_of(fields), self._model.elastic.model.dim
+        body = self._body_of(fields)
         found = self._blended(body.recovery, fields.samples, body.rows, body.shares, body.points)
-        R = np.broadcast_to(np.eye(3), found.stress.shape).copy()
-        # F = R U
-        left, _, right = np.linalg.svd(found.F)
-        R[..., :dim, :dim] = left @ right
-        turned = np.swapaxes(R, -1, -2) @ found.stress @ R
+        turned = turned_back(found.stress, found.F)
         links = np.broadcast_to(self.links[:, None], self._held.shape)
         points = body.points.reshape(-1, body.points.shape[-1])
         links, turned, kept = links.ravel(), turned.reshape(-1, 9), ~self._held.ravel()

@@ -228,3 +228,20 @@ def test_invalid_targets_are_refused():
         (lambda: arm().case(fm.Target(upward, sample, equals=1.0)).problem(), "leaves the plane", "two coordinates"),
     ):
         refused(make, part="", problem=problem, remedy=remedy)
+
+
+def test_one_limit_over_samples_is_a_target_at_each_of_them_once():
+    own = arm()
+    stress = fm.LargestStress()
+    found = fm.limits(stress, [own.both, own.moved, own.both], at_most=30.0)
+    assert found == tuple(fm.Target(stress, sample, at_most=30.0) for sample in (own.both, own.moved))
+    everywhere = fm.limits(stress, own.every(), at_most=30.0)
+    assert [target.sample for target in everywhere] == [own.both, own.moved, own.bent]
+    # of a cycle to all others
+    cycles = fm.limits(fm.LeastLife(since=own.bent), own.every(), at_least=6.0, scale=0.5)
+    assert [target.samples for target in cycles] == [(own.both, own.bent), (own.moved, own.bent)]
+    assert {target.scale for target in cycles} == {0.5}
+    with pytest.raises(fm.DescriptionError, match="there is no sample"):
+        fm.limits(stress, [target for target in own.every() if target.sample is None], at_most=30.0)
+    with pytest.raises(fm.DescriptionError, match="it has 0 relations"):
+        fm.limits(stress, [own.both])

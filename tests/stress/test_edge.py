@@ -1,15 +1,16 @@
-"""Stress along edges: beam theory, equilibrium of sections, a hole, and what may be asked."""
+"""Stress and strain along edges: beam theory, equilibrium of sections, free growth, and what may be asked."""
 
 import math
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.files import read_csv
 
 from ..plot.png import png_size
-from ..simulation.clamped import cantilever
+from ..simulation.clamped import YOUNG, cantilever
 from .test_peak import bent_bar
 
 FORCE, LENGTH = 1e-2, 20.0
@@ -36,6 +37,7 @@ def test_edges_of_a_cantilever_bear_its_moment_and_opposite_ones_opposite_stress
     largest = 6.0 * FORCE * LENGTH
     assert upper.along == pytest.approx(-6.0 * FORCE * (LENGTH - x), abs=0.005 * largest)
     assert upper.von_mises == pytest.approx(np.abs(upper.along), abs=0.01 * largest)
+    assert YOUNG * upper.strain == pytest.approx(upper.along, abs=0.01 * largest)
     opposite = np.interp(x, lower.points[:, 0], lower.along)
     assert opposite == pytest.approx(-upper.along, abs=0.005 * largest)
     # ∫ σ ds between both ends
@@ -54,7 +56,8 @@ def test_the_whole_outline_is_as_long_as_the_link_and_unknown_where_joints_hold_
     assert edge.points[0] == pytest.approx((-1.0, -0.5), abs=1e-9)
     assert edge.points[1, 1] == pytest.approx(-0.5, abs=1e-9)
     held = (x < -1e-9) | (x > LENGTH + 1e-9)
-    assert np.isnan(edge.along[held]).all() and np.isfinite(edge.along[~held]).mean() > 0.95
+    for values in (edge.along, edge.strain, edge.strain_error):
+        assert np.isnan(values[held]).all() and np.isfinite(values[~held]).mean() > 0.95
     assert edge.singular[(x > 0.0) & (x < 0.2)].all()
 
 
@@ -75,7 +78,26 @@ def test_the_inner_edge_of_a_curved_bar_in_pure_bending_has_the_stress_of_golovi
     assert edge.arc_length[-1] == pytest.approx(2.0 * math.pi, rel=1e-3)
     assert np.linalg.norm(edge.points, axis=1) == pytest.approx(2.0, rel=1e-3)
     inner = (edge.arc_length > 2.0) & (edge.arc_length < 4.3)
-    assert np.abs(edge.along[inner]) == pytest.approx(abs(golovin(0.02, 2.0, 4.0, 2.0)), rel=0.02)
+    expected = abs(golovin(0.02, 2.0, 4.0, 2.0))
+    assert np.abs(edge.along[inner]) == pytest.approx(expected, rel=0.02)
+    assert 1e6 * np.abs(edge.strain[inner]) == pytest.approx(expected, rel=0.02)
+    assert 0.0 < 1e6 * edge.strain_error[inner].max() < 0.02 * expected
+
+
+def test_free_expansion_is_no_strain_along_an_edge():
+    mechanism = fm.Mechanism("strip")
+    base = mechanism.rigid("base", fixed=True)
+    hot = fm.Material("hot", 1e5, 0.3, expansion=1e-4)
+    strip = mechanism.flexible("strip", fm.strip([(-1, 0), (10, 0)], thickness=1.0, depth=1.0), hot)
+    mechanism.weld(base, strip, at=(-0.5, 0), region=fm.Rectangle(1.0, 3.0))
+    push = mechanism.force(on=strip, at=(10, 0), direction=(0, 1), region=fm.Face())
+    scene = fm.Scene(mechanism, effects=[fm.Temperature(100.0)])
+    simulation = fm.Simulation(scene, space="plane-stress", size=1.0, comm=MPI.COMM_SELF)
+    curve = simulation.load_displacement(push, forces=[1e-2])
+    edge = curve.edge_stress(strip, start=(5.0, -0.5), end=(8.0, -0.5))
+    x = edge.points[:, 0]
+    # 6 F (L − x) / E b h², all lengths 1 % longer
+    assert edge.strain == pytest.approx(6e-7 * (10.0 - x) / 1.01**2, rel=0.005)
 
 
 def test_edges_are_drawn_and_tabulated(tmp_path):
@@ -87,6 +109,7 @@ def test_edges_are_drawn_and_tabulated(tmp_path):
     table, known = read_csv(tmp_path / "edge.csv"), np.isfinite(edge.along)
     assert table["along the edge [MPa]"] == pytest.approx(edge.along[known], abs=0.0)
     assert table["arc length [mm]"] == pytest.approx(edge.arc_length[known], abs=0.0)
+    assert table["strain along the edge"] == pytest.approx(edge.strain[known], abs=0.0)
 
 
 def test_requests_that_name_no_edge_are_refused():

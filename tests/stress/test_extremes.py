@@ -92,3 +92,23 @@ def test_the_lightest_bar_bears_what_it_is_allowed_to(quantity, bound):
     volume, limited = result.targets
     assert result.converged and limited.met and volume.corrected < 0.9 * volume.started
     assert limited.part is not None and limited.part.met
+
+
+@pytest.mark.thorough
+def test_the_lightest_bar_bears_cycles_between_two_forces():
+    simulation, across = bar(MPI.COMM_SELF)
+    link = simulation.scene.mechanism.flexible_links[0]
+    low, high = (fm.Sample({across: force}) for force in (-0.01, 0.02))
+    life = fm.Target(fm.LeastLife(since=low), high, at_least=15.8)
+    problem = fm.DesignProblem(
+        simulation,
+        [fm.SplineDesign(link, 2, thickness=(0.8, 2.0))],
+        targets=[fm.Target(fm.LinkVolume(link), least=True), life],
+    )
+    result = problem.verify(problem.optimise(), finer=2.0)
+    volume, limited = result.targets
+    assert result.converged and limited.met and volume.corrected < 0.9 * volume.started
+    assert limited.part is not None and limited.part.met
+    below, above = simulation.with_design(result).load_displacement(across, forces=[-0.01, 0.02]).frames
+    # with a margin for the error of recovery
+    assert 15.8 <= np.log10(below.life(above).cycles) < 16.1

@@ -82,6 +82,9 @@ def test_frames_whose_stress_is_not_asked_compile_and_evaluate_nothing_for_it(mo
     curve.frames[-1].peak, curve.frames[-1].peaks, curve.frames[-1].max_stress
     # σ and F, once for all of them
     assert seen == ["compile_expression", "evaluate_expression"]
+    curve.frames[-1].strain_peak, curve.frames[-1].strain_peaks
+    # and the elastic part of F where a strain is asked for
+    assert seen[2:] == ["evaluate_expression", "compile_expression", "evaluate_expression"]
 
 
 def test_options_of_the_recovery_are_those_of_the_simulation():

@@ -74,6 +74,9 @@ def test_strain_is_compared_with_a_strain():
     # at a free edge ε₁ = σ / E on the side in tension
     assert least.peak.value == pytest.approx(6.0 * 0.01 * (LENGTH - least.place[0]) / 1e5, rel=0.01)
     assert least.factor == pytest.approx(0.01 / least.peak.value, rel=1e-12)
+    assert least.peak == frame.strain_peak == frame.strain_peaks["bar"]
+    assert least.error == pytest.approx(least.factor * frame.strain_peak.error / frame.strain_peak.value, rel=1e-12)
+    assert f"ultimate strain 0.01, reached {frame.strain_peak.value:.4g}" in str(frame.safety)
 
 
 def test_cycles_by_hand():
