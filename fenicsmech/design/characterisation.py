@@ -33,6 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from fenicsmech.collective import agreed
 from fenicsmech.design.law_fit import SpecimenTest
 from fenicsmech.design.regression import error_sizes, regression
 from fenicsmech.elasticity import Specimen
@@ -491,7 +492,7 @@ class _Rig:
                 found[control.prescribed] = frame.force, by.numbers + by.control * origin
         computed, own = zip(*(found[value] for value in self._experiment.prescribed.tolist()), strict=True)
         slopes = np.zeros((len(self.errors), self._count))
-        slopes[:, self.concerned] = own
+        slopes[:, self.concerned] = agreed(self._simulation.comm, np.array(own))
         return curve, np.array(computed) - self._experiment.measured, slopes
 
     def _gradient(self, state: State, control: Control, observable: Observable) -> Gradient:
