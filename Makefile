@@ -144,7 +144,7 @@ hard-cases: install-test ## every case of tests/hard/, slow ones too, as a table
 	$(PYTHON) -m tests.hard
 
 # The tables that pages of the documentation include; `make bench` measures one, `make tables` all (hours).
-BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers constrained closeness handles parts stress live
+BENCHMARKS := verification solvers work_precision accuracy_control large stopping performance effects optimisers constrained closeness handles parts stress laws live
 BENCH = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m benchmarks
 
 bench: install ## seconds per load step of every demo's initial design: 3D, on ranks with whole designs, plane stress

@@ -63,6 +63,26 @@ CASES = (
         "1e-9; 0.2 of the order",
         "elasticity/test_incompressible.py",
     ),
+    Case(
+        "laws of rubber, stretched uniaxially, planar and equibiaxially, in space and in the plane, by hand",
+        "1e-9",
+        "elasticity/test_hand_curves.py::test_stresses_are_those_by_hand_in_all_models",
+    ),
+    Case(
+        "laws fitted to one of Treloar's tests, against parameters that Steinmann, Hossain and Possart give",
+        "2e-4 MPa",
+        "design/test_law_fit.py::test_fits_to_one_of_treloars_tests_are_those_of_the_literature",
+    ),
+    Case(
+        "Yeoh's law fitted to all of Treloar's tests, with standard errors, against linear least squares",
+        "1e-4",
+        "design/test_law_fit.py::test_yeoh_on_treloar_is_the_linear_least_squares_fit",
+    ),
+    Case(
+        "two leaves that warm up, against Timoshenko's bimetal",
+        "1e-4",
+        "effects/test_temperature.py::test_two_leaves_bend_as_the_bimetal_of_timoshenko",
+    ),
     Case("patch test", "1e-9", "elasticity/test_patch.py"),
     Case("rigid motion: no energy, no force", "1e-9", "elasticity/test_rigid_motion.py"),
     Case("convergence orders of P1 and P2 in 2D and 3D", "0.15 of the order", "elasticity/test_convergence.py"),

@@ -48,10 +48,9 @@ def main():
 
     experiments = []
     for thickness, name in FILES.items():
-        read = fm.read_csv(options.data / name)
         scene, push = bending_test(thickness, onyx(GUESS))
         sim = fm.Simulation(scene, space=options.space, size=options.size)
-        experiments.append(fm.Experiment(sim, push, read["force [N]"], read["displacement [mm]"]))
+        experiments.append(fm.Experiment.read(sim, push, options.data / name))
     fit = fm.fit_modulus(experiments, onyx(GUESS))
 
     low, high = fit.interval

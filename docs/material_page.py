@@ -20,8 +20,10 @@ without one is left out. Figures are those of the specimens of their tests, and 
 how far sources, specimens or directions differ. Moduli of plastics and silicones fall with temperature, moisture and
 time under load, which cards leave out.
 
-Laws are neo-Hookean with the modulus at small strain; Poisson's ratio is 0.49 where a card says 0.5. Strengths are data
-of the material, `fm.Strength`; stresses and strains are nominal.
+Laws are neo-Hookean with the modulus at small strain; `fm.material("Ecoflex", law=fm.Yeoh)` has the constants of Yeoh's
+law, for large strain, of a card that gives them. Poisson's ratio is 0.49 where a card says 0.5; a card without one asks
+for it: `fm.material("PETG", nu=…)`. Strengths are data of the material, `fm.Strength`; stresses and strains are
+nominal.
 """
 
 SUMMARY = ("E", "nu", "density", "yield_stress", "ultimate_stress", "ultimate_strain")

@@ -140,3 +140,16 @@ def read_csv(path: str | Path) -> dict[str, NDArray[np.float64]]:
             )
         values[index] = [finite(part, field) for field in row]
     return {header: values[:, k].copy() for k, header in enumerate(headers)}
+
+
+def column(part: str, table: Mapping[str, NDArray[np.float64]], *beginnings: str) -> str:
+    """The one header of ``table``, from ``read_csv``, that begins with one of ``beginnings``; case does not matter.
+
+    Raises:
+        DescriptionError: there is none, or there are several.
+    """
+    found = [header for header in table if header.lower().startswith(beginnings)]
+    if len(found) != 1:
+        problem = f"{counted(len(found), 'column')} of {' or '.join(beginnings)} among {', '.join(table)}"
+        raise DescriptionError(part, problem, "Give one column whose header begins so")
+    return found[0]

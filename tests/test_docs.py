@@ -37,6 +37,8 @@ def describe(names: Names, folder: Path) -> None:
     assert names["fit"].relative_rms[0] < 0.05
     assert names["rubber"].law.E == pytest.approx(6.0 * names["fit"].values["C1"], rel=1e-3)
     assert (folder / "fit.png").exists()
+    low, high = names["found"].intervals[names["guess"]]["E"]
+    assert low < names["pla"].law.E < high < 1.1 * low
 
 
 def simulate(names: Names, folder: Path) -> None:

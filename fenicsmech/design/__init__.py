@@ -6,8 +6,8 @@ from scattered starts ends in several. Its ``objective`` compares the quantities
 ``equilibria`` with the wanted values, and adds ``regularisers``. The ``rest_shape`` of the links follows the parameters
 through ``shape``: ``spline``, ``handles`` on it, ``weights`` by which handles move the mesh, the ``shape_map`` of
 these, and the ``handle_optimum`` of the mesh ``quality``; ``numbers`` of parts may change in addition.
-``characterisation`` fits Young's modulus and other parameters to load–displacement curves, ``law_fit`` parameters of
-laws to tests of specimens, with the intervals of ``regression``.
+``law_fit`` fits parameters of laws to tests of specimens, ``characterisation`` those of several materials to
+load–displacement curves too, with the intervals of ``regression``.
 """
 
 from fenicsmech.design.characterisation import (

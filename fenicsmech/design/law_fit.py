@@ -15,7 +15,7 @@ Source: Ogden, Saccomandi & Sgura (doi:10.1007/s00466-004-0593-y) for what fits 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,10 +27,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, least_squares
 
 from fenicsmech.collective import from_one
-from fenicsmech.design.regression import regression
+from fenicsmech.design.regression import error_sizes, regression
 from fenicsmech.elasticity import SPECIMENS, Specimen, check_kind, specimen_stress
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted, expect, real_array, set_fields, set_options
-from fenicsmech.files import read_csv
+from fenicsmech.files import column, read_csv
 from fenicsmech.laws import Law, drucker_stability
 from fenicsmech.plot import PALETTE, CurveSeries, plot_curve
 
@@ -70,12 +70,7 @@ class SpecimenTest:
             raise DescriptionError(f"stretches of {part}", f"one is {stretches.min():g}", remedy)
         if not np.any(stresses):
             raise DescriptionError(f"stresses of {part}", "there are none but zeros", "Give readings under load")
-        errors = np.abs(stresses).max() if self.errors is None else self.errors
-        errors = real_array(
-            f"errors of {part}", np.broadcast_to(errors, np.shape(errors) or stresses.shape), len(stresses)
-        )
-        if np.any(errors <= 0.0):
-            raise DescriptionError(f"errors of {part}", f"one is {errors.min():g}", "Give positive numbers")
+        errors = error_sizes(part, self.errors, stresses)
         set_fields(self, name=name, stretches=stretches, stresses=stresses, errors=errors)
 
     @classmethod
@@ -91,20 +86,12 @@ class SpecimenTest:
             OSError: the file cannot be read.
         """
         table, part = read_csv(path), f"test in '{path}'"
-        stretches = _column(part, table, ("stretch", "strain"))
-        stresses = _column(part, table, ("stress",))
+        stretches = column(part, table, "stretch", "strain")
+        stresses = column(part, table, "stress")
         values = table[stretches]
         if stretches.lower().startswith("strain"):
             values = 1.0 + values * (0.01 if "%" in stretches else 1.0)
         return cls(kind, values, table[stresses], errors, name or Path(path).stem)
-
-
-def _column(part: str, table: Mapping[str, NDArray], beginnings: tuple[str, ...]) -> str:
-    found = [header for header in table if header.lower().startswith(beginnings)]
-    if len(found) != 1:
-        problem = f"{counted(len(found), 'column')} of {' or '.join(beginnings)} among {', '.join(table)}"
-        raise DescriptionError(part, problem, "Give one column whose header begins so")
-    return found[0]
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.stats import t as student
 
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, real_array
 
 
 @dataclass(frozen=True)
@@ -53,3 +53,16 @@ def regression(
         standard_errors=dict(zip(names, errors.tolist(), strict=True)),
         intervals={n: (v - r, v + r) for n, v, r in zip(names, x.tolist(), reach.tolist(), strict=True)},
     )
+
+
+def error_sizes(part: str, errors: ArrayLike | None, measured: NDArray) -> NDArray:
+    """Sizes (n,) of the errors of ``measured`` values (n,): one or (n,); None: the largest of these.
+
+    Raises:
+        DescriptionError: there are not as many, or one is not positive.
+    """
+    given = np.abs(measured).max() if errors is None else errors
+    sizes = real_array(f"errors of {part}", np.broadcast_to(given, np.shape(given) or measured.shape), len(measured))
+    if np.any(sizes <= 0.0):
+        raise DescriptionError(f"errors of {part}", f"one is {sizes.min():g}", "Give positive numbers")
+    return sizes

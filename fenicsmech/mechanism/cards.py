@@ -38,7 +38,7 @@ from pathlib import Path
 from typing import Any
 
 from fenicsmech.errors import DescriptionError, finite
-from fenicsmech.laws import NeoHookean
+from fenicsmech.laws import Law, NeoHookean, Yeoh
 from fenicsmech.mechanism.parts import Material
 from fenicsmech.mechanism.strength import Basquin, Strength
 from fenicsmech.mechanism.units import MILLIMETRES, PSI, Units
@@ -66,8 +66,12 @@ QUANTITIES: dict[str, tuple[str, Mapping[str, float]]] = {
     "stress_at_100": ("stress at 100 % strain", _STRESS),
     "yeoh_1": ("C₁ of Yeoh's law, Σ Cᵢ (I₁ − 3)ⁱ", _STRESS),
     "yeoh_2": ("C₂ of Yeoh's law", _STRESS),
+    "yeoh_3": ("C₃ of Yeoh's law", _STRESS),
 }
 """What a card may hold: by name the words for it, and its units in SI."""
+
+ANY_SIGN = ("yeoh_2", "yeoh_3")
+"""Figures that may be zero or below."""
 
 INCOMPRESSIBLE = 0.49
 """Poisson's ratio of the law where a card says 0.5: volumes of real rubber change, and laws need resistance to it."""
@@ -150,63 +154,80 @@ class MaterialCard:
         """A figure by name, as ``E`` or ``yield_stress``; None if the card has none."""
         return next((figure for figure in self.figures if figure.name == name), None)
 
-    def material(self, *, units: Units = MILLIMETRES, nu: float | None = None) -> Material:
-        """The material of the card, neo-Hookean; as ``material``. *Local.*"""
-        young, poisson = self._si("E"), self._si("nu") if nu is None else nu
-        for name, value in (("E", young), ("nu", poisson)):
-            if value is None:
-                reason = dict(self.missing).get(name, "no public figure found")
-                remedy = "Give nu=…" if name == "nu" else "Make a Material(name, E, ν)"
-                raise DescriptionError(f"card {self.name!r}", f"it has no {QUANTITIES[name][0]} ({reason})", remedy)
-        law = NeoHookean(units.stress_of(young), INCOMPRESSIBLE if poisson == 0.5 else poisson)  # type: ignore[arg-type]
+    def material(self, *, units: Units = MILLIMETRES, nu: float | None = None, law: type[Law] = NeoHookean) -> Material:
+        """The material of the card; as ``material``. *Local.*"""
         density = self._si("density")
         return Material(
             self.name,
-            law=law,
+            law=self._law(law, units, nu),
             density=None if density is None else units.density_of(density),
             expansion=self._si("expansion"),
             strength=self._strength(units),
             units=units,
         )
 
-    def _strength(self, units: Units) -> Strength:
-        def stress(name: str) -> float | None:
-            value = self._si(name)
-            return None if value is None else units.stress_of(value)
+    def _law(self, law: type[Law], units: Units, nu: float | None) -> Law:
+        part = f"card {self.name!r}"
+        if law not in (NeoHookean, Yeoh):
+            problem = f"it has no constants of {getattr(law, '__name__', repr(law))}"
+            raise DescriptionError(part, problem, "Use law=NeoHookean or law=Yeoh, or fit a law by fit_law")
+        poisson = self._si("nu") if nu is None else nu
+        if poisson is None:
+            remedy = f"Give one: material({self.name!r}, nu=…); strips that bend in plane stress hardly depend on it"
+            raise DescriptionError(part, self._without("nu"), remedy)
+        poisson = INCOMPRESSIBLE if poisson == 0.5 else poisson
+        first = "E" if law is NeoHookean else "yeoh_1"
+        if (modulus := self._stress(first, units)) is None:
+            remedy = "Make a Material(name, E, ν)" if first == "E" else "Use law=NeoHookean, or fit a law by fit_law"
+            raise DescriptionError(part, self._without(first), remedy)
+        if law is NeoHookean:
+            return NeoHookean(modulus, poisson)
+        return Yeoh(modulus, self._stress("yeoh_2", units) or 0.0, self._stress("yeoh_3", units) or 0.0, poisson)
 
-        coefficient, exponent = stress("fatigue_coefficient"), self._si("fatigue_exponent")
+    def _without(self, name: str) -> str:
+        return f"it has no {Figure.quantity(name)} ({dict(self.missing).get(name, 'no public figure found')})"
+
+    def _strength(self, units: Units) -> Strength:
+        coefficient, exponent = self._stress("fatigue_coefficient", units), self._si("fatigue_exponent")
         return Strength(
-            yield_stress=stress("yield_stress"),
-            ultimate_stress=stress("ultimate_stress"),
+            yield_stress=self._stress("yield_stress", units),
+            ultimate_stress=self._stress("ultimate_stress", units),
             yield_strain=self._si("yield_strain"),
             ultimate_strain=self._si("ultimate_strain"),
             fatigue=None if coefficient is None or exponent is None else Basquin(coefficient, exponent),
-            endurance_stress=stress("endurance_stress"),
+            endurance_stress=self._stress("endurance_stress", units),
         )
+
+    def _stress(self, name: str, units: Units) -> float | None:
+        value = self._si(name)
+        return None if value is None else units.stress_of(value)
 
     def _si(self, name: str) -> float | None:
         figure = self.figure(name)
         return None if figure is None else figure.si
 
 
-def material(name: str | Path, *, units: Units = MILLIMETRES, nu: float | None = None) -> Material:
-    """A material from its card: ``material("Onyx")``. *Local.*
+def material(
+    name: str | Path, *, units: Units = MILLIMETRES, nu: float | None = None, law: type[Law] = NeoHookean
+) -> Material:
+    """A material from its card: ``material("Onyx")``, ``material("Ecoflex", law=Yeoh)``. *Local.*
 
     Args:
         name: that of a card of the package, or the path of a TOML file of your own, as ``cards`` describes it.
         units: those of the scene; mm, N and MPa unless given.
         nu: Poisson's ratio, in place of that of the card.
+        law: ``NeoHookean``, with the modulus at small strain, or ``Yeoh``, with the constants of a card that has them;
+            those of higher order that it leaves out are zero.
 
     Returns:
-        the material, neo-Hookean with the modulus at small strain, with density, thermal expansion and strength as far
-        as known.
+        the material, with density, thermal expansion and strength as far as known.
         Poisson's ratio is 0.49 where the card says 0.5.
 
     Raises:
-        DescriptionError: there is no such card, it is not as it should be, it has no modulus or Poisson's ratio, or the
-            units cannot be converted.
+        DescriptionError: there is no such card, it is not as it should be, it has no constants of the law or no
+            Poisson's ratio, or the units cannot be converted.
     """
-    return material_card(name).material(units=units, nu=nu)
+    return material_card(name).material(units=units, nu=nu, law=law)
 
 
 def material_card(name: str | Path) -> MaterialCard:
@@ -277,7 +298,7 @@ def _figure(part: str, name: str, data: Mapping[str, Any], sources: Mapping[str,
     value = finite(own, data.get("value"))
     low, high = (finite(f"{end} of {own}", data[end]) if end in data else None for end in ("low", "high"))
     signed = -value if name == "fatigue_exponent" else value
-    if signed <= 0.0 or (name == "nu" and value > 0.5):
+    if (signed <= 0.0 and name not in ANY_SIGN) or (name == "nu" and value > 0.5):
         wanted = {"fatigue_exponent": "below zero", "nu": "above 0, at most 0.5"}.get(name, "above zero")
         raise DescriptionError(own, f"it is {value:g}", f"Give a number {wanted}")
     if (low is not None and low > value) or (high is not None and high < value):

@@ -466,6 +466,11 @@ class Simulation:
         return self._discretisation.shapes
 
     @property
+    def materials(self) -> Mapping[FlexibleLink, Material]:
+        """The material of each flexible link. *Local.*"""
+        return dict(zip(self.scene.mechanism.flexible_links, self._discretisation.materials, strict=True))
+
+    @property
     def linkage(self) -> Linkage:
         """The mechanism's bodies and joints."""
         return self._discretisation.linkage

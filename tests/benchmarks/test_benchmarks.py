@@ -6,8 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from benchmarks import laws
 from benchmarks.stress import designs
 from benchmarks.table import publish
 from benchmarks.verification import CASES
@@ -28,6 +30,19 @@ def printed(name: str, *options: str) -> list[list[str]]:
 def test_a_written_table_is_what_was_printed(tmp_path, capsys):
     publish("sizes", format_table(["h", "n"], [[1.0, 2]]), write=True, folder=tmp_path)
     assert (tmp_path / "sizes.md").read_text() == capsys.readouterr().out.rstrip("\n") + "\n"
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("case", [case for case in laws.CASES if case.published], ids=lambda case: case.name)
+def test_no_published_parameters_fit_treloars_tests_better_than_ours(case):
+    fit = case.fit()
+
+    def size(numbers):
+        tests = [(laws.closed_form(case.law, numbers, t.kind, t.stretches) - t.stresses) / t.errors for t in fit.tests]
+        return np.linalg.norm(np.concatenate(tests))
+
+    *ours, _ = fit.law.parameters.values()
+    assert size(tuple(ours)) <= size(case.published)
 
 
 @pytest.mark.parametrize("test", [case.test for case in CASES])

@@ -1,5 +1,6 @@
 """Parameters of laws from tests of specimens: exact ones recovered, Treloar's rubber, intervals, remarks, refusals."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,17 @@ def test_yeoh_on_treloar_is_the_linear_least_squares_fit():
     assert fit.spread**2 == pytest.approx(variance, rel=1e-4)
     errors = np.sqrt(variance * np.diag(np.linalg.inv(A.T @ A)))
     assert list(fit.standard_errors.values()) == pytest.approx(errors, rel=1e-4)
+
+
+def test_fits_to_one_of_treloars_tests_are_those_of_the_literature():
+    # Steinmann, Hossain & Possart (doi:10.1007/s00419-012-0610-z): μ, C₁₀ + C₀₁ and C₁₀, C₀₁, to the digits they give
+    equibiaxial, planar, uniaxial = (replace(test, errors=1.0) for test in TRELOAR)
+    one_term, two_terms = fm.MooneyRivlin(0.2, 0.0, 0.4999999), fm.MooneyRivlin(0.2, 0.01, 0.4999999)
+    alone = {"held": ("C01", "nu"), "options": ONE}
+    assert fm.fit_law(one_term, [uniaxial], **alone).law.C10 == pytest.approx(0.5 * 0.5673, abs=1e-4)
+    assert fm.fit_law(one_term, [planar], **alone).law.C10 == pytest.approx(0.2348 - 0.065, abs=2e-4)
+    both = fm.fit_law(two_terms, [equibiaxial], options=ONE).law
+    assert (both.C10, both.C01) == pytest.approx((0.1713, 0.0047), abs=5e-5)
 
 
 def test_ogden_on_treloar_is_better_than_the_published_coefficients():

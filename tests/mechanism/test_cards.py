@@ -145,6 +145,38 @@ def test_constants_of_silicones_describe_one_curve(name):
     assert 6.0 * C1 == pytest.approx(E, rel=0.1)
 
 
+@pytest.mark.parametrize("name", ["Ecoflex", "Dragon Skin"])
+@pytest.mark.parametrize("units", [MILLIMETRES, METRES], ids=["mm", "m"])
+def test_cards_with_constants_of_yeoh_give_that_law_when_asked_for_it(name, units):
+    law = fm.material(name, units=units, law=fm.Yeoh).law
+    C1, C2, at_100 = (units.stress_of(figure(name, each).si) for each in ("yeoh_1", "yeoh_2", "stress_at_100"))
+    assert law == fm.Yeoh(C1, C2, 0.0, 0.49)
+    assert isinstance(fm.material(name).law, fm.NeoHookean)
+    (stress,) = fm.specimen_stress(law, "uniaxial", [2.0])
+    assert stress == pytest.approx(at_100, rel=0.1)
+
+
+def test_constants_of_higher_order_may_be_negative_and_are_zero_where_left_out(tmp_path):
+    path, constant = tmp_path / "clay.toml", '[figures.{}]\nvalue = {}\nunit = "kPa"\ntest = "fit"\nsource = "book"\n\n'
+    yeoh = constant.format("yeoh_1", 200.0) + constant.format("yeoh_3", -2.0)
+    path.write_text(CARD.replace("[missing]", yeoh + "[missing]"))
+    assert fm.material(path, law=fm.Yeoh).law.parameters == pytest.approx(
+        {"C1": 0.2, "C2": 0.0, "C3": -0.002, "nu": 0.3}
+    )
+
+
+def test_silicones_break_at_the_strain_that_their_maker_gives():
+    assert fm.material("Ecoflex").strength.ultimate_strain == 9.0
+    assert fm.material("Dragon Skin").strength.ultimate_strain == 3.64
+
+
+def test_laws_that_a_card_has_no_constants_of_are_refused():
+    with pytest.raises(fm.DescriptionError, match=r"'Onyx': it has no C₁ of Yeoh's law.*fit_law"):
+        fm.material("Onyx", law=fm.Yeoh)
+    with pytest.raises(fm.DescriptionError, match=r"'Onyx': it has no constants of Ogden. Use law=NeoHookean or"):
+        fm.material("Onyx", law=fm.Ogden)
+
+
 def test_fatigue_lines_bear_a_usual_share_of_the_ultimate_stress():
     lines = [strength for card in CARDS.values() if (strength := card.material(nu=0.3).strength).fatigue is not None]
     assert len(lines) >= 3
@@ -180,7 +212,7 @@ def test_an_unknown_name_lists_those_known():
 
 
 def test_a_card_without_a_ratio_asks_for_it():
-    with pytest.raises(fm.DescriptionError, match=r"'PETG GN071-100': it has no Poisson's ratio.*nu=…"):
+    with pytest.raises(fm.DescriptionError, match=r"it has no Poisson's ratio.*material\('PETG GN071-100', nu=…\)"):
         fm.material("PETG")
     assert fm.material("PETG", nu=0.4).law.nu == 0.4
 
