@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import ParabolaPredictor, Stepper, on_cubic
@@ -118,7 +118,8 @@ def equilibrium_at(solver: EquilibriumSolver, followed: FollowedControl, state: 
         NotConverged: the KKT matrix is singular.
     """
     at = solver.linearise(state, followed.at(followed.value(solver.system, state)))
-    return at.point((solver.relative(at.residual),), 0)
+    point = at.point((solver.relative(at.residual),), 0)
+    return replace(point, tangent=solver.system.settled(point.tangent, state))
 
 
 def linear_reach(point: EquilibriumPoint, *, value: float | None, conjugate: float | None) -> float:
@@ -243,8 +244,8 @@ class ArcLengthStepper(Stepper):
         return self.followed
 
     def chord(self, start: EquilibriumPoint, end: EquilibriumPoint) -> Step:
-        """Change of state from ``start`` to ``end``."""
-        return self.system.difference(end.state, start.state)
+        """Change of state from ``start`` to ``end``, without the turns of links that spin loosely."""
+        return self.system.settled_difference(end.state, start.state)
 
     def along(self, start: EquilibriumPoint, end: EquilibriumPoint) -> float:
         """Distance of ``end`` ahead of ``start`` along the tangent there."""

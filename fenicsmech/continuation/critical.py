@@ -114,7 +114,7 @@ def crossing(path: ArcLengthStepper, critical: CriticalPoint, mode: Step, sense:
         except NotConverged:
             size *= 0.5
             continue
-        path.length = metric.norm(path.chord(point, found))
+        path.length = metric.norm(path.system.difference(found.state, point.state))
         return found
     raise NotConverged("no path was found across the bifurcation")
 

@@ -29,7 +29,8 @@ the same on all processes and machines, and not by time:
        of those reached, past its turns, to the first
        stable equilibrium under all
     12. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
-       which they balance with springs
+       which they balance with springs; first of all where
+       these are softer than the rounding of stiff links
     13. of curves that have snapped: load steps from rest to    as these
        the value, whose path may go on where that snapped
        to ends

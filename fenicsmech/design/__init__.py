@@ -48,7 +48,15 @@ from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, Target
 from fenicsmech.design.run import Checkpoint, DesignIterate, DesignProgress, Round, minimise_together
 from fenicsmech.design.search import Scatter, Search, SearchResult, StartResult
 from fenicsmech.design.shape.edges import MidEdgeNodes, edge_weights
-from fenicsmech.design.shape.handle_optimum import HandleOptimum, HandlePlacement, ShapeError, follow_spline, motion
+from fenicsmech.design.shape.handle_optimum import (
+    HandleOptimum,
+    HandleOptions,
+    HandlePlacement,
+    ShapeError,
+    crowding,
+    follow_spline,
+    motion,
+)
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
 from fenicsmech.design.shape.quality import Barrier, QualitySum
 from fenicsmech.design.shape.shape_map import LinkParameters, ShapeMap, ShapeRequest, shape_link, shape_links

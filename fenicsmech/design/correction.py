@@ -367,7 +367,8 @@ class CorrectedRun:
             here = objective.evaluate(begin.parameters)
             reason = Reason[found.ended[0]]
             memory = np.zeros(0) if begin.memory is None else begin.memory
-            return Optimum(begin.number, begin.evaluations, here.parameters, memory, reason, here.penalty.value), round
+            own = (begin.number, begin.evaluations, here.parameters, memory, reason, begin.refusal)
+            return Optimum(*own, here.penalty.value), round
         space, number = low.simulation.fidelity.model.name, len(round.changes) + 1
 
         def watch(iterate: Iterate) -> None:

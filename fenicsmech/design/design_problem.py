@@ -251,7 +251,7 @@ class DesignProblem:
                     end.placement.p[self._own.rest.of_numbers], self.simulation.scene.units
                 ),
                 targets=target_results(compared, self.simulation.scene.units, np.array(round.started), reached),
-                reason=end.optimum.reason.value,
+                reason=end.optimum.reason.words(end.optimum.refusal),
                 converged=end.optimum.reason.converged,
                 verified=end.verified,
                 active=objective.active(end.optimum.parameters),

@@ -36,7 +36,7 @@ class Optimum:
     """The optimum found by a run.
 
     Attributes:
-        number, evaluations, parameters, memory, reason: as in ``Iterate`` and its evaluation.
+        number, evaluations, parameters, memory, reason, refusal: as in ``Iterate`` and its evaluation.
         regulariser: R there.
     """
 
@@ -45,6 +45,7 @@ class Optimum:
     parameters: np.ndarray
     memory: np.ndarray
     reason: Reason
+    refusal: str
     regulariser: float
 
 
@@ -65,7 +66,8 @@ def minimise_together(
             comm.bcast(None, root=0)
         assert last.reason is not None, "an optimiser ends for a reason"
         here = last.evaluation
-        return Optimum(last.number, last.evaluations, here.parameters, last.memory, last.reason, here.penalty.value)
+        own = (last.number, last.evaluations, here.parameters, last.memory, last.reason, last.refusal)
+        return Optimum(*own, here.penalty.value)
 
     return comm.bcast(on_all(comm, lambda: decide() if comm.rank == 0 else _follow(comm, objective)), root=0)
 
@@ -122,7 +124,7 @@ class DesignIterate:
     errors: np.ndarray
 
 
-_FORMAT = "fenicsmech checkpoint 5"
+_FORMAT = "fenicsmech checkpoint 6"
 
 
 @dataclass(frozen=True)
@@ -186,6 +188,7 @@ class Checkpoint:
             "parameters": iterate.evaluation.parameters.tolist(),
             "handles": handles.tolist(),
             "memory": iterate.memory.tolist(),
+            "refusal": iterate.refusal,
             "round": asdict(round),
             "ended": None if iterate.reason is None else [iterate.reason.name, repr(optimiser)],
         }
@@ -199,11 +202,12 @@ class Checkpoint:
         """
         data = self.read()
         memory = np.array(data["memory"], dtype=float)
-        start = Start(np.array(data["parameters"]), data["number"], data["evaluations"], memory, resumed=True)
-        own: dict[str, Any] = {
+        own = (np.array(data["parameters"]), data["number"], data["evaluations"], memory)
+        start = Start(*own, resumed=True, refusal=data["refusal"])
+        round: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in data["round"].items()
         }
-        return Saved(start, np.array(data["handles"]), Round(**own), data["ended"] and tuple(data["ended"]))
+        return Saved(start, np.array(data["handles"]), Round(**round), data["ended"] and tuple(data["ended"]))
 
     def load_together(self, comm: MPI.Comm) -> Saved | None:
         """The start on all processes, errors too; None if the file does not exist yet."""

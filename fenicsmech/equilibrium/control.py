@@ -16,9 +16,10 @@ A path may turn back in v and in q. Its arc length s is a control as well, with 
 
     ⟨n, y − y₀⟩ − s,      y the state with the value v of the control that is followed,
 
-in place of the equation that prescribes v. It needs no row of the matrix: that prescribes v, or q where it changes more
-(Rheinboldt & Burkardt, doi:10.1145/357456.357460), which leaves K regular at limit points of the other, and the Newton
-step is moved into the plane by bordering, with r the right-hand side of the control of v or q, the local parameter,
+without the turns of links that spin loosely (``spinning``), in place of the equation that prescribes v. It needs no row
+of the matrix: that prescribes v, or q where it changes more (Rheinboldt & Burkardt, doi:10.1145/357456.357460), which
+leaves K regular at limit points of the other, and the Newton step is moved into the plane by bordering, with r the
+right-hand side of the control of v or q, the local parameter,
 
     K x₀ = −R,    K x₁ = r,    x = x₀ + τ x₁,    τ such that y + x lies in the plane (``PathPlane``).
 
@@ -326,7 +327,7 @@ class ArcLengthControl(Control):
         return self.local.constrained
 
     def value(self, system, state):
-        return self.metric.dot(self.normal, system.difference(state, self.origin))
+        return self.metric.dot(self.normal, system.settled_difference(state, self.origin))
 
     def gap(self, system, state):
         return 0.0  # the local parameter stays where it is
@@ -359,9 +360,9 @@ class PathPlane:
     """
 
     def __init__(self, control: ArcLengthControl, system, state: State, x: PETSc.Vec) -> None:
-        self._control, self._system, self.x = control, system, x
+        self._control, self._system, self._state, self.x = control, system, state, x
         self._rate = control.local.tangent(system.unknowns.step(x))
-        self._slope = control.metric.dot(control.normal, self._rate)
+        self._slope = control.metric.dot(control.normal, system.settled(self._rate, state))
         self._gap = control.value(system, state) - control.prescribed
 
     @property
@@ -372,7 +373,7 @@ class PathPlane:
     def along(self, x: PETSc.Vec) -> float:
         """τ that keeps a change of state by ``x`` parallel to the plane."""
         # the value that it changes itself is left to the next iteration
-        step = replace(self._system.unknowns.step(x), force=0.0)
+        step = replace(self._system.settled(self._system.unknowns.step(x), self._state), force=0.0)
         return -self._control.metric.dot(self._control.normal, step) / self._slope
 
     def reached(self, x: PETSc.Vec) -> Step:

@@ -54,7 +54,7 @@ from petsc4py import PETSc
 
 from fenicsmech.collective import agreed, from_one
 from fenicsmech.equilibrium.active_set import ActiveSet
-from fenicsmech.equilibrium.control import Control, PathPlane
+from fenicsmech.equilibrium.control import ArcLengthControl, Control, PathPlane
 from fenicsmech.equilibrium.linearisation import EquilibriumPoint, NotConverged
 from fenicsmech.equilibrium.solver import STEP, EquilibriumMethod, EquilibriumSolver
 from fenicsmech.equilibrium.state import State, Step
@@ -168,7 +168,7 @@ class NewtonSolver(EquilibriumSolver):
             residuals.append(self.relative(residual))
             # steps with a shift creep along soft modes: that rounding no longer falls with them says nothing
             if iteration > 0 and self.converged(residual, norm if shift == least else math.inf):
-                if path:  # critical points are located by its tangent and inertia
+                if path and not self._held:  # critical points are located by its tangent and inertia
                     return self.linearise(state, control, residual).point(residuals, iteration + 1)
                 current = shift == least and not predicted and (contact is None or contact.current)
                 current = current and options.reuse_factor > 0.0
@@ -367,7 +367,7 @@ class SpinningSolver(NewtonSolver):
     """
 
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
-        if control.along_path:  # whose plane fixes the spin
+        if control.along_path and not start.loose:  # the plane fixes the spin
             return super().iterate(start, control)
         used = 0
         if not start.loose:
@@ -380,7 +380,10 @@ class SpinningSolver(NewtonSolver):
             point = self._turned(start, control)
         except NotConverged as failure:
             raise NotConverged(failure.reason, used + failure.iterations) from failure
-        return self._spun(replace(point, iterations=used + point.iterations))
+        point = self._spun(replace(point, iterations=used + point.iterations))
+        if isinstance(control, ArcLengthControl) and point.state.loose:
+            return point.scaled(1.0 / control.metric.norm(point.tangent))
+        return point
 
     def _turned(self, state: State, control: Control) -> EquilibriumPoint:
         """The equilibrium found by turns between those with held spins."""
@@ -451,8 +454,8 @@ class SpinningSolver(NewtonSolver):
         for hold in holds:
             x = self.try_solve(hold, STEP)
             loose = loose or x is None or not abs(hold.dot(x)) * self.options.loose < 1.0
-        tangent = self.system.spinning.unspun(state, point.tangent) if loose else point.tangent
-        return replace(point, state=replace(state, loose=loose), tangent=tangent)
+        state = replace(state, loose=loose)
+        return replace(point, state=state, tangent=self.system.settled(point.tangent, state))
 
     def residual(self, state: State, control: Control) -> Residual:
         residual = super().residual(state, control)

@@ -15,7 +15,7 @@ of second order in the load, 1e-12 of the stiffness of the links. A linear step 
       K x = μ h,     s = (K + h hᵀ)⁻¹ h,     x = s μ / (1 − hᵀ s).
 
 That is for loose spins; what loads resist firmly, as a pendulum, Newton's method finds with all else. Loose ones turn
-at once, whatever little changes: neither predictions nor the search for snaps count their turns.
+at once, whatever little changes: neither predictions, nor the search for snaps, nor the turns of paths count them.
 """
 
 from __future__ import annotations
@@ -52,6 +52,17 @@ class SpinningLinks:
             poses, after = spin.turned(joints, poses, angle, before)
             self._interfaces.nodal(u)[nodes] += after - before
         return u, poses
+
+    def turned_back(self, state: State, before: State) -> State:
+        """``state`` with spins turned back to where they are in ``before``. Local."""
+        joints, u, poses = self._joints, state.u.copy(), state.poses
+        for spin, nodes in self._own:
+            for _ in range(3):  # the error of an angle, from the change of quaternions, is of third order
+                change = joints.unknowns(poses) - joints.unknowns(before.poses)
+                points = self._interfaces.places(u)[nodes]
+                poses, after = spin.turned(joints, poses, -spin.angle(joints, before.poses, change), points)
+                self._interfaces.nodal(u)[nodes] += after - points
+        return replace(state, u=u, poses=poses)
 
     def unspun(self, state: State, step: Step) -> Step:
         """``step`` from ``state`` without the turns of spins. Local."""

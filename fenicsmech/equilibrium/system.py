@@ -200,6 +200,14 @@ class EquilibriumSystem:
         z = self.joints.unknowns(later.poses) - self.joints.unknowns(earlier.poses)
         return Step(z=z, **{name: getattr(later, name) - getattr(earlier, name) for name in _SHARED})
 
+    def settled_difference(self, later: State, earlier: State) -> Step:
+        """``later`` − ``earlier`` without the turns of links that spin loosely in ``later``. Local."""
+        return self.difference(self.spinning.turned_back(later, earlier) if later.loose else later, earlier)
+
+    def settled(self, step: Step, state: State) -> Step:
+        """``step`` from ``state`` without the turns of links that spin loosely there. Local."""
+        return self.spinning.unspun(state, step) if state.loose else step
+
     def independent(self, step: Step, state: State) -> Step:
         """``step`` to ``state`` without the displacements of nodes that bodies move, and of links that spin loosely:
         these turn at once, whatever little changes. Local."""

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -199,7 +200,8 @@ class CurveStepper:
     def _steps_from(self, rest: RestPose, state: State, control: Control) -> LoadStepper:
         """Load steps from the equilibrium under constant loads to which ``rest`` led."""
         self._system.load(state)
-        shifts = LoadSteps().least_shifts(state.minimum_shift, loads_resist=rest.loads_resist and not rest.reached)
+        resist = (rest.loads_resist and not rest.reached) or self._springs_below_rounding
+        shifts = LoadSteps().least_shifts(state.minimum_shift, loads_resist=resist)
         kind = DisplacementControl() if control.constrained else LoadControl()
         predictor = self.discretisation.predictor
         return LoadStepper(self.solver, state, kind, predictor=predictor, shifts=shifts)
@@ -383,14 +385,22 @@ class CurveStepper:
         if not (self.request.others or self._model.effects):
             return state
         control = LoadFactorControl()
+        if self._springs_below_rounding and (settled := self._settled(control)) is not None:
+            return settled
         start, predictor = control.prepare(state), self.discretisation.predictor
         stepper = DeadCentreStepper(self.solver, start, control, predictor=predictor)
         try:
             with self.keeping_frames():
                 state = stepper.advance(control.at(1.0)).state
         except LoadStepsFailed as failure:
-            found = self._followed(start, control.at(0.5 * failure.reached)) or self._settled(control)
-            if found is not None:
+            if (found := self._followed(start, control.at(0.5 * failure.reached))) is not None:
+                return found
+            if (found := self._settled(control)) is not None:
+                _log.warning(
+                    "%s: steps of constant loads end early; curves start where these and springs balance",
+                    self.request.where,
+                )
+                self._effort += Effort(snaps=1)
                 return found
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
@@ -426,21 +436,20 @@ class CurveStepper:
         """The equilibrium under all constant loads, from the rigid pose in which springs balance with them; None if
         none is found.
 
-        Constant loads that are not far weaker than springs swing a mechanism far, past folds where it snaps.
+        Constant loads that are not far weaker than springs swing a mechanism far, past folds where it snaps. Where
+        springs are softer than the rounding of what loads the links, each load step comes to rest elsewhere.
         """
-        if not self.adrift or (pose := self._rest_poses.balanced()) is None:
+        if not (self.adrift or self._springs_below_rounding) or (pose := self._rest_poses.balanced()) is None:
             return None
         all_loads = control.at(1.0)
-        stepper = LoadStepper(self.solver, all_loads.prepare(pose), all_loads, predictor=self.discretisation.predictor)
+        start = replace(all_loads.prepare(pose), minimum_shift=LoadSteps().minimum_shift)
+        stepper = LoadStepper(self.solver, start, all_loads, predictor=self.discretisation.predictor)
         try:
             with self.keeping_frames():
                 state = stepper.advance(all_loads).state
         except LoadStepsFailed:
             return None
-        _log.warning(
-            "%s: steps of constant loads end early; curves start where these and springs balance", self.request.where
-        )
-        self._effort += Effort(stepper.iterations, 1)
+        self._effort += Effort(stepper.iterations)
         return state
 
     # -- failures ----------------------------------------------------------------------------------------------
@@ -478,7 +487,7 @@ class CurveStepper:
         otherwise: str = "Try follow() or displacement control past a limit point, other values, or a finer mesh",
     ) -> EquilibriumError:
         """The error with a remedy that fits the mechanism, or else the one given."""
-        if self._has_springs_below_rounding():
+        if self._springs_below_rounding:
             otherwise = (
                 "The springs are softer than the rounding of the stiffest links: "
                 "make links rigid that hardly bend, or springs stiffer"
@@ -503,13 +512,19 @@ class CurveStepper:
             rate[joints.columns[point.body]] += direction @ point.gradient(state.poses)
         return is_held(joints, state.poses, state.motors, rate, self._system.rigid_rows)
 
-    def _has_springs_below_rounding(self) -> bool:
+    @cached_property
+    def _springs_below_rounding(self) -> bool:
         """Whether some freedom is held by springs softer than rounding, 1e-15 of the links' stiffness."""
         rigid, motors = self._model.linkage.rigid, self._joints.motor_values(self.request.configuration.position)
         motors = np.concatenate([motors, np.zeros(len(rigid.connections) - len(motors))])  # welds of links
-        free = free_motions(rigid, self._poses, motors, self._model.spring_potentials)
-        held = np.abs(np.linalg.eigvalsh(free.curvature))
-        return bool(np.min(held[held > free.rounding], initial=np.inf) < 1e-15 * self._system.unknowns.unit**2)
+        springs, least = self._model.spring_potentials, 1e-15 * self._system.unknowns.unit**2
+
+        def softer() -> bool:
+            free = free_motions(rigid, self._poses, motors, springs)
+            held = np.abs(np.linalg.eigvalsh(free.curvature))
+            return bool(np.min(held[held > free.rounding], initial=np.inf) < least)
+
+        return bool(springs) and from_one(self.discretisation.comm, softer)
 
     # -- residual along zero-energy modes -----------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenicsmech.design import HandleOptimum, LinkHandles, ShapeError, follow_spline, motion
+from fenicsmech.design import HandleOptimum, HandleOptions, LinkHandles, ShapeError, crowding, follow_spline, motion
 
 from ..oracles.dense import taylor_rates
 from .shapes import bench
@@ -182,9 +182,44 @@ def test_a_handle_at_a_kink_is_held_or_goes_to_the_side_where_the_sum_falls(held
     slope = np.linalg.lstsq(np.array([after.ravel(), before.ravel()]), wanted, rcond=None)[0]
     gradient = np.zeros((3, 2, 3))
     gradient[1] = slope.reshape(2, 3)
-    sides = motion(handles, p, theta, gradient)
+    sides = motion(handles, p, theta, gradient, HandleOptions())
     assert sides.free.tolist() == [True, not held, True]
     assert held or sides.segments[1] == 1
+
+
+def test_handles_that_a_constant_slope_presses_together_stay_apart():
+    handles, options = bench(2).shape.shapes[0].handles, HandleOptions()
+    theta, force = handles.initial.copy(), np.zeros(len(handles))
+    second, third = np.flatnonzero(handles.slides)[1:3]
+    force[second] = -100.0  # falls towards the next one
+    drawn = theta[third] - theta[second]
+    for _ in range(60):
+        gap = theta[third] - theta[second]
+        _, slope, curvature = crowding(handles, theta, options)
+        step = -(slope + force)[second] / max(curvature[second, second], 1e-3)
+        theta[second] += np.clip(step, -0.8 * gap, 0.8 * gap)
+    _, slope, curvature = crowding(handles, theta, options)
+    assert (slope + force)[second] == pytest.approx(0.0, abs=1e-6)
+    assert 0.0 < theta[third] - theta[second] < options.close * drawn
+    assert curvature[second, second] > 0.0
+
+
+def test_what_keeps_handles_apart_is_nothing_far_apart_and_smooth():
+    handles, options = bench(2).shape.shapes[0].handles, HandleOptions()
+    value, slope, curvature = crowding(handles, handles.initial, options)
+    assert value == 0.0 and not slope.any() and not curvature.any()
+    first, second = np.flatnonzero(handles.slides)[:2]
+    near = handles.initial.copy()
+    near[first] += 0.95 * (near[second] - near[first])
+    value, slope, curvature = crowding(handles, near, options)
+    assert value > 0.0
+    direction = 1e-3 * (near[second] - near[first]) * handles.slides
+    ahead, behind = (crowding(handles, near + sign * direction * np.arange(len(near)), options) for sign in (1, -1))
+    turned = direction * np.arange(len(near))
+    assert (ahead[0] - behind[0]) / 2.0 == pytest.approx(slope @ turned, rel=1e-2)
+    assert (ahead[1] - behind[1]) / 2.0 == pytest.approx(curvature @ turned, rel=1e-2, abs=1e-3 * abs(value))
+    near[first] = near[second] + 1e-3
+    assert crowding(handles, near, options)[0] == np.inf
 
 
 @pytest.mark.parallel

@@ -1,5 +1,7 @@
 """Links between two ball joints spin idly: equilibria and their stability do not depend on it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from fenicsmech.equilibrium import LoadControl
 BUCKLING = 40.0 / 30.0 * np.pi**2 * 1770.0 * 3.0**4 / 12.0 / 60.0**2
 
 
-def rssr(*, rod: bool = False):
+def rssr(*, rod: bool = False, order: int = 2, effects: tuple = ()):
     """A four-bar in space, pushed at its rocker against the locked crank; the coupler may end in a rigid ``rod``."""
     m = fm.Mechanism("RSSR four-bar")
     ground, crank, rocker = m.rigid("ground", fixed=True), m.rigid("crank"), m.rigid("rocker")
@@ -26,7 +28,7 @@ def rssr(*, rod: bool = False):
     m.revolute(rocker, ground, at=(80, 0, 40), axis=(0, 1, 0))
     motor = m.motor(hinge)
     push = m.force(on=rocker, at=(80, 0, 10), direction=(-1, 0, 0), name="push")
-    return fm.Simulation(fm.Scene(m), space="3d", size=3.0), push, motor
+    return fm.Simulation(fm.Scene(m, effects=list(effects)), space="3d", size=3.0, order=order), push, motor
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.6])
@@ -221,6 +223,24 @@ def test_coupler_turns_its_flat_side_to_its_weight():
     assert (frame.unstable_modes, frame.snapped_through) == (0, False)
     assert frame.outputs[middle] == pytest.approx(sag, rel=0.03)
     assert frame.iterations <= 40
+
+
+def test_paths_do_not_turn_with_links_whose_spin_hardly_anything_resists():
+    simulation, push, _ = rssr(order=1, effects=(fm.Gravity((0.0, -1e-2, 3e-3)),))
+    curve = simulation.follow(push, until=fm.Until(force=35.0, frames=8))
+    assert not curve.events and max(frame.iterations for frame in curve.frames[1:]) == 1
+
+    system, state = simulation.solver(push).system, curve.frames[-1].state
+    (spin,) = system.spinning.spins
+    (point, axis), joints, angle = spin.line(state.poses), system.joints, 0.7
+    u, z = np.zeros_like(state.u), np.zeros(joints.size)
+    system.interfaces.nodal(u)[:] = angle * np.cross(axis, system.interfaces.places(state.u) - point)
+    for body, rates in spin.rates(joints, state.poses).items():
+        z[joints.columns[body]] = angle * rates
+    none = system.difference(state, state)
+    spun = system.moved(state, replace(none, u=u, z=z))
+    assert state.loose and system.size(system.difference(spun, state)) > 0.3
+    assert system.size(system.settled_difference(spun, state)) < 1e-6
 
 
 def pendulum():

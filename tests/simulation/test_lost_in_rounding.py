@@ -51,7 +51,8 @@ def test_a_load_that_is_not_felt_is_refused_where_an_obstacle_is_in_the_way():
         simulation.load_displacement(push, forces=[1e-12])
 
 
-def test_springs_softer_than_rounding_are_named():
+def lever(effects: Callable[[object, object], list]) -> tuple[fm.Simulation, object]:
+    """A blade that turns about the origin."""
     mechanism = fm.Mechanism("lever")
     base = mechanism.rigid("base", fixed=True)
     blade = mechanism.flexible(
@@ -59,7 +60,18 @@ def test_springs_softer_than_rounding_are_named():
     )
     hinge = mechanism.revolute(base, blade, at=(0, 0), interface_radius=1.0)
     push = mechanism.force(on=blade, at=(30, 0), direction=(0, 1))
-    scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, 1e-10, rest=0.2)])
-    simulation = fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF)
+    scene = fm.Scene(mechanism, effects=effects(hinge, blade))
+    return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
+
+
+def test_springs_softer_than_rounding_are_named():
+    simulation, push = lever(lambda hinge, blade: [fm.JointSpring(hinge, 1e-10, rest=0.2)])
     with pytest.raises(fm.EquilibriumError, match="The springs are softer than the rounding"):
         simulation.load_displacement(push, forces=[1e-13])
+
+
+def test_a_spring_softer_than_the_rounding_of_a_pressure_turns_the_blade_at_once():
+    simulation, push = lever(lambda hinge, blade: [fm.JointSpring(hinge, 1e-6, rest=0.2), fm.Pressure(blade, 500.0)])
+    (frame,) = simulation.load_displacement(push, forces=[0.0]).frames
+    assert frame.state.poses[1, 2] == pytest.approx(0.2, abs=1e-3)
+    assert frame.iterations <= 50 and not frame.snapped_through

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import line_search
@@ -96,32 +96,35 @@ class BFGS(Optimiser):
         curvature = last.memory.reshape(len(here.parameters), -1)
         if last.reduction <= self.tolerance:
             return _iterate(number, evaluations, here, curvature, Reason.CONVERGED)
-        there, tried = self._search(problem, here, _step(here, curvature))
+        there, tried, refusal = self._search(problem, here, _step(here, curvature))
         if there is None:  # B was learnt elsewhere and may not hold here
             curvature = _fresh(here, problem.lengths)
-            there, more = self._search(problem, here, _step(here, curvature))
+            there, more, refusal = self._search(problem, here, _step(here, curvature))
             tried += more
         if there is None:
-            return _iterate(number, evaluations + tried, here, curvature, Reason.NO_DESCENT)
+            stuck = Reason.BLOCKED if refusal else Reason.NO_DESCENT
+            return replace(_iterate(number, evaluations + tried, here, curvature, stuck), refusal=refusal)
         s, y = there.parameters - here.parameters, _gradient(there) - _gradient(here)
         curvature = updated(curvature, s, y, problem.lengths, first=number == 0)
         reason = Reason.ITERATIONS if number + 1 >= self.iterations else None
         return _iterate(number + 1, evaluations + tried, there, curvature, reason)
 
-    def _search(self, problem: Problem, here: Evaluation, step: np.ndarray) -> tuple[Evaluation | None, int]:
-        """The last point of the line search that was lower than those before, and the number of evaluations."""
+    def _search(self, problem: Problem, here: Evaluation, step: np.ndarray) -> tuple[Evaluation | None, int, str]:
+        """The last point of the line search that was lower than those before, the number of evaluations, and the reason
+        why a point has no value, empty if all have one."""
         step = step * min(1.0, self.longest / float(np.max(np.abs(step / problem.lengths))))
-        found, tried, slope = here, 0, float(here.gradient @ step)
+        found, tried, refusal, slope = here, 0, "", float(here.gradient @ step)
 
         def value(p: np.ndarray) -> float:
-            nonlocal found, tried
+            nonlocal found, tried, refusal
             length = float((p - here.parameters) @ step) / float(step @ step)
             tried += 1
             try:
                 found = problem.evaluate(p, min(here.value + self.armijo * length * slope, found.value))
             except TooHigh as high:
                 return high.merit
-            except Infeasible:
+            except Infeasible as failure:
+                refusal = str(failure)
                 return np.inf
             return found.value
 
@@ -132,7 +135,7 @@ class BFGS(Optimiser):
                     value, lambda p: found.gradient, here.parameters, step, here.gradient, here.value,
                     c1=self.armijo, c2=self.wolfe, maxiter=20,
                 )  # fmt: skip
-        return None if found is here else found, tried
+        return None if found is here else found, tried, refusal
 
 
 def _gradient(here: Evaluation) -> np.ndarray:

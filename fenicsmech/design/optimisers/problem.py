@@ -237,12 +237,17 @@ class Reason(Enum):
     RESOLVED = "the remaining gain is small compared with the error of the elements: refine them, or give a tolerance"
     VIOLATED = "inequalities stay violated, and no small change of the design helps: relax one, or start elsewhere"
     ITERATIONS = "the number of iterations ran out: allow more to get closer to the minimum"
+    BLOCKED = "designs ahead have no value, and short steps gain little"
     NO_DESCENT = "no step lowers the objective although the gradient does not vanish: check bounds and mesh quality"
 
     @property
     def converged(self) -> bool:
         """Whether a minimum was found within the errors."""
         return self in (Reason.CONVERGED, Reason.RESOLVED)
+
+    def words(self, refusal: str) -> str:
+        """The text, where designs have no value with the reason for that: ``refusal``, as in ``Iterate``."""
+        return f"{self.value}: {refusal}" if self is Reason.BLOCKED else self.value
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,6 +259,7 @@ class Start:
         number, evaluations: iterations and objective evaluations so far.
         memory: state of the optimiser, from ``Iterate.memory``; None at the very start.
         resumed: whether a minimisation was interrupted here.
+        refusal: as in ``Iterate``.
     """
 
     parameters: np.ndarray
@@ -261,6 +267,7 @@ class Start:
     evaluations: int = 0
     memory: np.ndarray | None = None
     resumed: bool = False
+    refusal: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,6 +281,7 @@ class Iterate:
         memory: state of the optimiser, for resuming.
         reduction: the predicted one, over the objective; inf if that is not known.
         reason: None while it runs.
+        refusal: reason why designs ahead of the last steps that gained little have no value; empty if they have.
     """
 
     number: int
@@ -282,6 +290,7 @@ class Iterate:
     memory: np.ndarray
     reduction: float
     reason: Reason | None
+    refusal: str = ""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ valley and are refused until μ makes them short: the model takes R for all the 
 truth Σ r_k H_k outweighs R. Convergence is judged by the undamped step without H, since H may be too large.
 
 A step is accepted if it lowers the merit O + Σ ν_k β(c_k) by a part of the predicted reduction; μ falls after good
-steps and grows after bad or infeasible ones. The penalties ν exceed the multipliers λ of the undamped step, follow them
+steps and grows after bad or infeasible ones. An end by short steps is a minimum only if no infeasible ones made them
+short. The penalties ν exceed the multipliers λ of the undamped step, follow them
 slowly where they fall, and grow where that step leaves inequalities violated: the method is Fletcher's Sℓ₁QP (Practical
 Methods of Optimization, doi:10.1002/9781118723203, section 14.4) with Levenberg's damping in place of a trust region
 and Powell's rule for ν (Nocedal & Wright, Numerical Optimization, doi:10.1007/978-0-387-40065-5, chapter 18).
@@ -139,6 +140,7 @@ class SQP(Optimiser):
         here, lengths = problem.evaluate(start.parameters), problem.lengths
         memory = self._begin(here, lengths) if start.memory is None else Memory.unpacked(start.memory, here)
         last, ahead = self._iterate(start.number, start.evaluations + 1, here, memory, lengths)
+        last = replace(last, refusal=start.refusal)
         watch(last)
         resolved = self._resolution(last, lengths, start.resumed)
         while last.reason is None:
@@ -169,8 +171,9 @@ class SQP(Optimiser):
         violated = np.any(here.inequalities.values > self.violation)
         little, stalled = last.reduction <= self.least_reduction, memory.stalls >= self.stalls
         if (little and (stalled or self._stationary(here, memory, step, lengths))) or (stalled and not violated):
-            return replace(last, reason=Reason.VIOLATED if violated else Reason.CONVERGED), ahead
-        memory = eased
+            blocked = Reason.BLOCKED if last.refusal and not little else Reason.CONVERGED
+            return replace(last, reason=Reason.VIOLATED if violated else blocked), ahead
+        memory, refusal = eased, last.refusal
         merit_here, damping = here.merit(memory.penalties), memory.damping
         for _ in range(self.refusals):
             step = self._step(here, memory, damping, lengths)
@@ -187,7 +190,8 @@ class SQP(Optimiser):
                     second = 2.0 * (failure.residuals - here.residuals - here.jacobian @ s)
                     memory = replace(memory, hessians=bent(memory.hessians, s, second, lengths))
                 continue
-            except Infeasible:
+            except Infeasible as failure:
+                refusal = str(failure)
                 damping *= 10.0
                 continue
             gain, number = merit_here - new.merit(memory.penalties), last.number + 1
@@ -201,8 +205,11 @@ class SQP(Optimiser):
             hessians = turned(memory.hessians, s, new.jacobian - here.jacobian, lengths)
             memory = replace(memory, damping=damping, stalls=stalls, curvature=curvature, hessians=hessians)
             reason = Reason.ITERATIONS if number >= self.iterations else None
-            return self._iterate(number, evaluations, new, memory, lengths, reason)
-        return replace(last, evaluations=evaluations, reason=Reason.VIOLATED if violated else Reason.NO_DESCENT), ahead
+            found, ahead = self._iterate(number, evaluations, new, memory, lengths, reason)
+            return replace(found, refusal=refusal if stalls else ""), ahead
+        stuck = Reason.BLOCKED if refusal else Reason.NO_DESCENT
+        reason = Reason.VIOLATED if violated else stuck
+        return replace(last, evaluations=evaluations, reason=reason, refusal=refusal), ahead
 
     def _iterate(
         self,

@@ -1,4 +1,10 @@
-"""Optimal handle positions, min over θ of S(θ, p) = Σ_e ρ(e), and their derivatives with respect to p.
+"""Optimal handle positions, min over θ of S(θ, p) = Σ_e ρ(e) + ε B(θ), and their derivatives with respect to p.
+
+B keeps handles apart that follow each other along the spline, by the gaps g_k between them over those as drawn, g⁰_k,
+
+    B = Σ_k log³ max(a g⁰_k / g_k, 1),     a = 0.2.
+
+Cells alone may not: where no vertex lies between two handles, Σρ may fall until they meet, and no step leads on.
 
 Links do not have cells in common, so S is a sum of functions of the θ of one shape each; the cells of links that share
 a shape depend on the same θ. Newton's method with exact Hessians minimises them together, with a line search for each
@@ -47,6 +53,8 @@ class HandleOptions:
         turn: largest turn of a joint in one step, rad.
         kept: part of the gap to the next handle that one step must leave.
         flattest: least eigenvalue of the Hessian in a step, relative to the largest.
+        apart: ε, in cells.
+        close: a, the gap between handles over that as drawn below which they are kept apart.
 
     Raises:
         DescriptionError: a number is out of its range.
@@ -60,9 +68,11 @@ class HandleOptions:
     turn: float = 0.5
     kept: float = 0.2
     flattest: float = 1e-8
+    apart: float = 1e-3
+    close: float = 0.2
 
     def __post_init__(self) -> None:
-        parts = ("armijo", "shortest", "kept", "flattest")
+        parts = ("armijo", "shortest", "kept", "flattest", "close")
         set_options(self, "optimal handle positions", below_one=parts, iterations=1, halvings=0)
 
 
@@ -227,10 +237,9 @@ class HandleOptimum:
         sums = np.zeros(len(self._map.shapes))
         for piece in self._map.pieces:
             sums[piece.shape] += per_link[piece.link]
-        # between its ends, handles follow each other along the spline
         pairs = zip(self._handles, positions, strict=True)
-        ordered = np.array([np.all(np.diff(_along(handles, theta)) > 0.0) for handles, theta in pairs])
-        return np.where(np.isnan(sums) | ~ordered, np.inf, sums)
+        sums += np.array([crowding(*own, self._options)[0] for own in pairs])
+        return np.where(np.isnan(sums), np.inf, sums)
 
     def _by_positions(self, p: np.ndarray, positions: Sequence[np.ndarray]) -> list[PositionDerivatives]:
         """Derivatives of S by the positions of the handles, per link."""
@@ -240,7 +249,7 @@ class HandleOptimum:
             self._reducer = _MomentHessian(self._map, hessian)
         moments = self._map.moments(self._quality.gradient())
         links = zip(self._handles, self._map.parameters(p), positions, moments, strict=True)
-        motions = [motion(*link) for link in links]
+        motions = [motion(*link, self._options) for link in links]
         return list(map(PositionDerivatives, motions, self._reducer.reduce(hessian, [own.by_theta for own in motions])))
 
     def _second_derivatives(self, placement: HandlePlacement) -> list[PositionDerivatives]:
@@ -260,7 +269,8 @@ class HandleMotion:
     Attributes:
         handles: all handles of the link.
         p, theta: parameters of its spline, (size,), and positions of the handles, (n,).
-        gradient: ∂S/∂T, (n, 2, 3).
+        gradient: Σρ by T, (n, 2, 3).
+        crowding: ε ∂B/∂θ, (n,), and ε ∂²B/∂θ², (n, n).
         segments: the segment of the spline each of them stays in, (n,).
         free: which of them move, (n,).
     """
@@ -269,6 +279,7 @@ class HandleMotion:
     p: np.ndarray
     theta: np.ndarray
     gradient: np.ndarray
+    crowding: tuple[np.ndarray, np.ndarray]
     segments: np.ndarray
     free: np.ndarray
 
@@ -291,26 +302,41 @@ class HandleMotion:
         return min(1.0, options.turn / max(turn, options.turn), limits.min(initial=1.0))
 
 
-def motion(handles: LinkHandles, p: np.ndarray, theta: np.ndarray, gradient: np.ndarray) -> HandleMotion:
-    """The motion of handles, from ∂S/∂T; at a control point to the side to which S falls."""
+def motion(
+    handles: LinkHandles, p: np.ndarray, theta: np.ndarray, gradient: np.ndarray, options: HandleOptions
+) -> HandleMotion:
+    """The motion of handles, from Σρ by T; at a control point to the side to which S falls."""
+    _, slope, curvature = crowding(handles, theta, options)
     segments = after = handles.segments(theta)
     free = handles.slides | handles.turns
     at_kink = handles.slides & (theta == after)
     if np.any(at_kink):
         before = np.where(at_kink, after - 1, after)
         forward, backward = (
-            np.sum(gradient * handles.by_theta(p, theta, side), axis=(1, 2)) for side in (after, before)
+            np.sum(gradient * handles.by_theta(p, theta, side), axis=(1, 2)) + slope for side in (after, before)
         )
         segments = np.where(at_kink & (forward >= 0.0), before, after)
         free &= ~(at_kink & (forward >= 0.0) & (backward <= 0.0))
-    return HandleMotion(handles, p, theta, gradient, segments, free)
+    return HandleMotion(handles, p, theta, gradient, (slope, curvature), segments, free)
+
+
+def crowding(handles: LinkHandles, theta: np.ndarray, options: HandleOptions) -> tuple[float, np.ndarray, np.ndarray]:
+    """ε B, infinite if handles are out of order, ε ∂B/∂θ, (n,), and ε ∂²B/∂θ², (n, n)."""
+    drawn, gaps = np.diff(_along(handles, handles.initial)), np.diff(_along(handles, theta))
+    x = gaps / drawn
+    if np.any(x <= 0.0):
+        return np.inf, np.zeros_like(theta), np.zeros((len(theta), len(theta)))
+    rates = np.diff(np.diag(handles.rides.astype(float)), axis=0) / gaps[:, None]
+    small = np.log(np.maximum(options.close / x, 1.0))
+    slope, curvature = -3.0 * small**2 @ rates, rates.T @ ((6.0 * small + 3.0 * small**2)[:, None] * rates)
+    return options.apart * float(np.sum(small**3)), options.apart * slope, options.apart * curvature
 
 
 @dataclass(frozen=True, eq=False)
 class PositionDerivatives:
     """Derivatives of S by the positions of a link's free handles.
 
-    S_θ = S_T · T_θ,     S_θθ = T_θ · S_TT · T_θ + S_T · T_θθ,     S_θp alike.
+    S_θ = S_T · T_θ + ε B_θ,     S_θθ = T_θ · S_TT · T_θ + S_T · T_θθ + ε B_θθ,     S_θp alike, without B.
 
     Attributes:
         motion: of the handles.
@@ -324,7 +350,7 @@ class PositionDerivatives:
     def slope(self) -> np.ndarray:
         """S_θ, (f,)."""
         own = self.motion
-        return np.sum(own.gradient * own.by_theta, axis=(1, 2))[own.free]
+        return (np.sum(own.gradient * own.by_theta, axis=(1, 2)) + own.crowding[0])[own.free]
 
     @cached_property
     def hessian(self) -> np.ndarray:
@@ -332,6 +358,7 @@ class PositionDerivatives:
         own = self.motion
         twice = own.handles.twice_by_theta(own.p, own.theta, own.gradient, own.segments)[own.free]
         hessian = np.einsum("jmbl,mbl->jm", self.rows[own.free][:, own.free], own.by_theta[own.free]) + np.diag(twice)
+        hessian += own.crowding[1][own.free][:, own.free]
         return 0.5 * (hessian + hessian.T)
 
     @cached_property

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from fenicsmech.design import (
     BFGS,
+    SQP,
     Barrier,
     Deferred,
     Evaluation,
@@ -204,7 +205,8 @@ def test_running_out_of_iterations_is_reported(optimiser):
 @each_optimiser
 def test_nothing_feasible_ahead_is_reported_and_the_start_kept(optimiser):
     last, _ = watched(optimiser, Cliff())
-    assert last.reason is Reason.NO_DESCENT
+    assert last.reason is Reason.BLOCKED
+    assert last.refusal in last.reason.words(last.refusal)
     assert np.array_equal(last.evaluation.parameters, np.zeros(2))
 
 
@@ -246,6 +248,33 @@ def test_residuals_of_second_degree_along_a_step_are_met_by_the_next_one(poor):
     assert bent.asked[1] == pytest.approx([2.0], abs=1e-6)
     assert bent.asked[2] == pytest.approx([1.0], abs=1e-6)
     assert last.evaluation.parameters == pytest.approx([1.0], abs=1e-9)
+
+
+class Edge(Problem):
+    """r = (y, x − 1), without values where x + y² > ½: the way to the minimum ends at this edge."""
+
+    def __init__(self) -> None:
+        super().__init__(np.array([0.0, 0.5]), np.ones(2))
+
+    def residuals(self, parameters):
+        x, y = parameters
+        if x + y**2 > 0.5:
+            raise Infeasible("beyond the edge")
+        return np.array([y, x - 1.0]), np.array([[0.0, 1.0], [1.0, 0.0]])
+
+
+@pytest.mark.parametrize("optimiser", [LevenbergMarquardt(), SQP()])
+def test_steps_made_short_by_points_without_values_do_not_end_at_a_minimum(optimiser):
+    last, history = watched(optimiser, Edge())
+    assert last.reason is Reason.BLOCKED and not last.reason.converged
+    assert last.reason.words(last.refusal).endswith("beyond the edge")
+    assert last.reduction > optimiser.least_reduction
+    # a run resumed before its end knows the reason, too
+    before = history[-2]
+    start = Start(
+        before.evaluation.parameters, before.number, before.evaluations, before.memory, refusal=before.refusal
+    )
+    assert watched(optimiser, Edge(), start)[0].refusal == last.refusal
 
 
 def test_steps_do_not_cross_barriers_that_the_residual_alone_would_cross():
