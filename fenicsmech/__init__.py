@@ -23,6 +23,7 @@ from fenicsmech.design import (
     DesignProblem,
     DesignResult,
     Experiment,
+    HandlePlacement,
     LawFit,
     LawFitOptions,
     LevenbergMarquardt,
@@ -288,7 +289,7 @@ __all__ = [
     # design and characterisation
     "DesignProblem", "SplineDesign", "ShapeBounds", "Target", "StayClose", "MeshQuality", "Regulariser",
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
-    "DesignIterate", "DesignLinearisation",
+    "DesignIterate", "DesignLinearisation", "HandlePlacement",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "fit_parameters", "ParameterFit", "ParameterFitOptions",
     "SpecimenTest", "fit_law", "LawFit", "LawFitOptions", "specimen_stress", "Design",

@@ -51,6 +51,7 @@ Solver to server, a line each, with the number of their task:
                   design, lengths (typical change of each parameter), curves: [{forces, values, errors, jacobian}],
                   gradient, curvature, active (bounds that hold it back), whole (not cut where a curve snaps),
                   links: [{name, controls [[[x, y, δ], tangent]], entries (parameter of each, −1 none), thickness}]
+    required  values of the project's requirements, with their estimated errors: [[component]]; empty if failed
     pushed    curve, point
     done      seconds
     cancelled

@@ -141,6 +141,19 @@ class ByKind(Schema):
 
 
 @dataclass(frozen=True)
+class ByEntry(Schema):
+    """Records of several kinds, told apart by an entry that each has alone; the first one where there is none."""
+
+    kinds: Mapping[str, Record]
+
+    def check(self, value, place=""):
+        if not isinstance(value, dict):
+            raise Refused(place, "not a record")
+        own = next((kind for entry, kind in self.kinds.items() if entry in value), next(iter(self.kinds.values())))
+        own.check(value, place)
+
+
+@dataclass(frozen=True)
 class TextOr(Schema):
     """A text of one schema, or something else of another."""
 
@@ -170,7 +183,7 @@ class Mapped(Schema):
 class Anything(Schema):
     """Plain data of limited depth and size, whose meaning another schema checks later."""
 
-    depth: int = 12
+    depth: int = 18
     most: int = 20000
 
     def check(self, value, place=""):

@@ -114,7 +114,7 @@ class Work:
         self._plotter = MechanismPlotter(self._drawing.simulation.model, parts=2)
         solver.check()
         self._meshed, self._shown = False, np.zeros(0)
-        self._steady: dict[int, list[float]] = {}  # forces of each curve, up to where it snaps or is unstable
+        self._steady: dict[int, list[float]] = {}  # values of each curve, up to where it snaps or is unstable
 
     def solve(self) -> None:
         """The curves of the project's design; before that its optimisation where wanted; derivatives at the end."""
@@ -123,7 +123,9 @@ class Work:
             problem = self._solver.problem("targets", self._project, self._drawing.problem)
         if problem is not None:
             own = problem
-            result = own.optimise(start=at, surrogate=None, optimiser=OPTIMISER, watch=lambda it: self._show(own, it))
+            equal = all(target.relation == "equals" for target in own.targets)
+            optimiser = OPTIMISER if equal else None
+            result = own.optimise(start=at, surrogate=None, optimiser=optimiser, watch=lambda it: self._show(own, it))
             at = own.placement(result)
             self._emit(
                 {
@@ -137,12 +139,14 @@ class Work:
             )
         self._curves(self._drawing.simulation if at is None else self._designed(at))
         self._linearise(at)
+        if self._project.get("requirements"):
+            self._require(at)
 
     def push(self) -> None:
         """The equilibrium under a force that the pointer exerts."""
         at, force = placement(self._project, self._along), self._task["force"]
         simulation = self._drawing.simulation if at is None else self._designed(at)
-        request = self._drawing.request(self._project, self._task["curve"], [force])
+        request = self._drawing.request(self._project, self._task["curve"], [force], pushed=True)
         curve = simulation.compute(request)
         self._emit({"event": "pushed", "curve": self._task["curve"], "point": self._point(curve.frames[-1])})
 
@@ -190,8 +194,9 @@ class Work:
                 }
             )
             if iterate is None:
-                steady = takewhile(lambda own: own.stable and not own.snapped_through, frames)
-                self._steady[number] = [own.force for own in steady if own.force]
+                pairs = zip(forces, frames, strict=False)  # fewer frames where it failed
+                steady = takewhile(lambda pair: pair[1].stable and not pair[1].snapped_through, pairs)
+                self._steady[number] = [value for value, _ in steady if value]
             if curve is not None and iterate is None:
                 peak = curve.frames[-1].peak
                 own = peak and {"value": _number(peak.value), "error": _number(peak.error), "link": peak.link}
@@ -217,9 +222,11 @@ class Work:
             return  # the curve that ends early is told already
         self._solver.check()
         rows, curves = 0, []
-        for forces in reached:
+        for forces, curve in zip(reached, self._project["curves"], strict=True):
             mine = slice(rows, rows + len(forces))
             rows += len(forces)
+            if curve.get("held") or "ratios" in curve:  # no displacements of one force under it
+                forces, mine = [], slice(0)
             own = {"values": found.values[mine], "errors": found.errors[mine], "jacobian": found.jacobian[mine]}
             curves.append({"forces": forces, **{key: _rounded(value) for key, value in own.items()}})
         drawn = {own["name"]: own["shape"] for own in self._project["links"] if own["kind"] == "flexible"}
@@ -244,6 +251,20 @@ class Work:
                 ],
             }
         )
+
+    def _require(self, at: HandlePlacement | None) -> None:
+        """Values of what is required beside the targets on curves."""
+        problem = self._solver.problem("targets", self._project, self._drawing.problem)
+        if problem is None:
+            return
+        try:
+            found = problem.linearise(problem.initial if at is None else at)
+        except EquilibriumError as error:
+            self._emit({"event": "required", "values": [], "failed": _told(error)})
+            return
+        rows = np.split(found.values + found.errors, np.cumsum([target.size for target in problem.targets])[:-1])
+        wanted = rows[len(self._project["targets"]) :]
+        self._emit({"event": "required", "values": [_rounded(own) for own in wanted], "failed": None})
 
     def _point(self, frame: Frame) -> dict[str, Any]:
         """A frame as the page draws it, its mesh sent once before."""

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import fenicsmech as fm
-from fenicsmech.live import Solver, edited, example, export, project_of, script
+from fenicsmech.live import Solver, edited, example, export, script
 
 
 def solved(project, *, fit=False, cancelled=lambda events: False, kind="solve", **more):
@@ -216,46 +215,3 @@ def test_an_outline_is_exported_as_dxf_in_its_place(finished, tmp_path):
     assert points.min(axis=0) == pytest.approx([-3.0, -3.0], abs=0.3) and points.max(axis=0) == pytest.approx(
         [43.0, 63.0], abs=0.3
     )
-
-
-def test_a_problem_of_a_script_is_the_project_that_describes_it():
-    drawn = example("truss-finger")
-    finger = fm.Mechanism("truss finger")
-    base = finger.rigid("base", fixed=True)
-    left, right, tip = (finger.rigid(name) for name in ("left leg", "right leg", "tip"))
-    shape = fm.strip([(0, 0), (18, 34), (40, 60)], thickness=3.0, depth=20.0)
-    diagonal = finger.flexible("diagonal", shape, fm.SMOOTH_SIL_950)
-    for (a, b), at, name in (
-        ((base, left), (0, 0), "foot of left leg"),
-        ((base, right), (40, 0), "foot of right leg"),
-        ((left, tip), (0, 60), "head of left leg"),
-        ((right, tip), (40, 60), "head of right leg"),
-    ):
-        finger.revolute(a, b, at=at, name=name)
-    finger.revolute(base, diagonal, at=(0, 0), interface_radius=3.0, name="foot of diagonal")
-    finger.revolute(diagonal, tip, at=(40, 60), interface_radius=3.0, name="head of diagonal")
-    push = finger.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
-    sim = fm.Simulation(fm.Scene(finger), space="3d", size=3.0)
-    targets = [fm.Target(push, force=0.1, displacement=6.0), fm.Target(push, force=0.4, displacement=9.0)]
-    problem = fm.DesignProblem(sim, [fm.SplineDesign(diagonal, segments=3, thickness=(1.5, 6.0))], targets=targets)
-    assert project_of(problem) == drawn | {"design": None}
-
-
-def test_a_problem_that_the_page_does_not_know_is_refused_by_name():
-    beam = fm.Mechanism("beam")
-    ground, link = (
-        beam.rigid("ground", fixed=True),
-        beam.flexible(
-            "rubber",
-            fm.strip([(0, 0), (40, 0)], thickness=2.0, depth=5.0),
-            fm.Material("rubber", law=fm.Yeoh(1.0, 0.1, 0.0, nu=0.45)),
-        ),
-    )
-    beam.weld(ground, link, at=(0, 0), interface_radius=2.0)
-    pull = beam.force(on=link, at=(40, 0), direction=(0, 1))
-    sim = fm.Simulation(fm.Scene(beam), space="plane-strain", size=2.0)
-    problem = fm.DesignProblem(
-        sim, [fm.SplineDesign(link, segments=1)], targets=[fm.Target(pull, force=0.1, displacement=1.0)]
-    )
-    with pytest.raises(fm.DescriptionError, match="Yeoh"):
-        project_of(problem)
