@@ -66,7 +66,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 # results that a page which is opened later needs
-_KEPT = ("mesh", "curve", "errors", "linear", "fitted", "iterate", "failed")
+_KEPT = ("mesh", "curve", "errors", "linear", "fitted", "iterate", "required", "failed")
 
 
 @dataclass(frozen=True)
@@ -336,7 +336,9 @@ class Server:
                 "positions": own["positions"],
                 "others": own["others"],
                 "points": [
-                    [point["displacement"] + error, point["force"]]
+                    [point["displacement"], point["force"] + error]
+                    if own.get("held")
+                    else [point["displacement"] + error, point["force"]]
                     for point, error in zip(self._drawn["points"], event["errors"], strict=True)
                 ],
             }

@@ -194,9 +194,11 @@ class Work:
                 }
             )
             if iterate is None:
-                pairs = zip(forces, frames, strict=False)  # fewer frames where it failed
-                steady = takewhile(lambda pair: pair[1].stable and not pair[1].snapped_through, pairs)
-                self._steady[number] = [value for value, _ in steady if value]
+                held = self._project["curves"][number].get("held", False)
+                stable = [own.stable_under_control if held else own.stable for own in frames]
+                good = [own and not frame.snapped_through for own, frame in zip(stable, frames, strict=True)]
+                pairs = zip(forces, good, strict=False)  # fewer frames where it failed
+                self._steady[number] = [value for value, _ in takewhile(lambda pair: pair[1], pairs) if value]
             if curve is not None and iterate is None:
                 peak = curve.frames[-1].peak
                 own = peak and {"value": _number(peak.value), "error": _number(peak.error), "link": peak.link}
