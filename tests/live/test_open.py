@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.live import Refused, draw, example, forces_of, live, project_of, read_project, script
+from fenicsmech.live import Refused, Solver, draw, example, forces_of, live, project_of, read_project, script
 
 DEMOS = ("switch", "constant_force", "gripper", "suspension", "claw", "truss", "klann")
 
@@ -28,12 +28,6 @@ def demo(name):
     described = module.describe()
     sim = fm.Simulation(described[0], space="plane-stress", size=2.0 * module.QUICK, order=1)
     return fm.DesignProblem(sim, **module.wanted(*described))
-
-
-def values(simulation, request):
-    """Forces and displacements of a curve, each over the largest."""
-    curve = simulation.compute(request)
-    return [own / np.abs(own).max() for own in (curve.forces, curve.displacements)]
 
 
 @pytest.mark.parametrize(
@@ -248,3 +242,25 @@ def test_plain_data_make_nothing_but_what_a_project_may_have(data):
     project = example("truss-finger") | {"requirements": [{"name": "strange", "data": data}]}
     with pytest.raises(Refused):
         read_project(project)
+
+
+@pytest.mark.thorough
+def test_an_optimised_design_is_opened_and_its_script_computes_its_curve(tmp_path, monkeypatch):
+    problem = demo("switch")
+    result = problem.optimise()
+    project, drawing = reopened(problem, result)
+    begin = forces_of(project, 0)
+    finger = problem.simulation.scene.mechanism.forces[0]
+    expected = problem.simulation.with_design(result).load_displacement(finger, displacements=begin)
+    events = []
+    Solver(events.append).run({"task": 1, "kind": "solve", "project": project, "fit": False})
+    (curve,) = (event for event in events if event["event"] == "curve")
+    scale = np.abs(expected.forces).max()
+    assert [point["force"] for point in curve["points"]] == pytest.approx(expected.forces, abs=1e-5 * scale)
+    (required,) = (event for event in events if event["event"] == "required")
+    reached = [target.corrected for target in result.targets]
+    assert [value for (value,) in required["values"]] == pytest.approx(reached, abs=1e-4)
+    (tmp_path / "design.py").write_text(script(project))
+    monkeypatch.chdir(tmp_path)
+    found = runpy.run_path("design.py")["curve_0"]
+    assert np.abs(found.forces - expected.forces).max() < 1e-9 * scale
