@@ -1,4 +1,4 @@
-"""Cancelling a computation: equilibria, derivatives and estimates ask before each factor whether they go on."""
+"""Ending a computation: equilibria, derivatives and estimates ask before each factor whether they go on."""
 
 from __future__ import annotations
 
@@ -12,6 +12,20 @@ class Cancelled(Exception):
     """Another task has come."""
 
 
+class TooLong(Exception):
+    """The time of a task is over."""
+
+
+def too_long(seconds: float) -> dict[str, str]:
+    """What is told of a solve whose time is over: part, problem and remedy."""
+    remedy = "Choose larger elements, fewer frames or smaller loads, and solve again; what was found before stays"
+    return {
+        "part": "time limit",
+        "problem": f"the solve takes longer than {seconds:g} s and was ended",
+        "remedy": remedy,
+    }
+
+
 @dataclass(frozen=True)
 class Cancellable(LinearMethod):
     """The method by size, whose solvers call ``check`` before they factor.
@@ -20,7 +34,7 @@ class Cancellable(LinearMethod):
     an iteration, by what ``check`` raises.
 
     Attributes:
-        check: raises Cancelled.
+        check: raises Cancelled or TooLong.
     """
 
     check: Callable[[], None]

@@ -1,12 +1,14 @@
 """The solver process of the live page: tasks come as lines of JSON on standard input, results go to standard output.
 
 A task holds the whole project, so that a process that was ended loses nothing. A new task cancels the one at work, at
-the next iteration of Newton's method or the next factor (``cancel``). ``messages`` describes tasks and results.
+the next iteration of Newton's method or the next factor (``cancel``), and so does the end of its time.
+``messages`` describes tasks and results.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import threading
@@ -21,7 +23,7 @@ from fenicsmech.design import DesignIterate, DesignProblem, HandlePlacement, Lev
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import EquilibriumError, FenicsmechError
 from fenicsmech.live.build import Drawing, draw, placement
-from fenicsmech.live.cancel import Cancellable, Cancelled
+from fenicsmech.live.cancel import Cancellable, Cancelled, TooLong, too_long
 from fenicsmech.live.project import Project, drawing, forces_of
 from fenicsmech.plot import MechanismShape
 from fenicsmech.polygons import edge_loops
@@ -45,12 +47,14 @@ class Solver:
     def __init__(self, emit: Emit, cancelled: Callable[[], bool] = lambda: False) -> None:
         self._emit, self._cancelled = emit, cancelled
         self._method = PrimalDualNewton(linear=Cancellable(self.check))
+        self._end = math.inf  # of the time of the task at work
         self._drawn: tuple[str, Drawing] | None = None
         self._problems: dict[str, DesignProblem | None] = {}
 
     def run(self, task: Mapping[str, Any]) -> None:
         """Does a task, whose results carry its number."""
-        began, number = perf_counter(), task["task"]
+        began, number, longest = perf_counter(), task["task"], task.get("longest", math.inf)
+        self._end = began + longest
 
         def emit(event: dict[str, Any]) -> None:
             self._emit({**event, "task": number})
@@ -64,6 +68,8 @@ class Solver:
             emit({"event": "done", "seconds": round(perf_counter() - began, 3)})
         except Cancelled:
             emit({"event": "cancelled"})
+        except TooLong:
+            emit({"event": "failed", **too_long(longest)})
         except FenicsmechError as error:
             emit({"event": "failed", **_told(error)})
         except Exception as error:  # whatever happens here, the next gesture is answered
@@ -71,9 +77,11 @@ class Solver:
             emit({"event": "failed", "part": "solver", "problem": reason[:400], "remedy": "Undo the last change"})
 
     def check(self) -> None:
-        """Raises Cancelled if another task has come."""
+        """Raises Cancelled if another task has come, and TooLong if the time of this one is over."""
         if self._cancelled():
             raise Cancelled
+        if perf_counter() > self._end:
+            raise TooLong
 
     def drawing(self, project: Project) -> Drawing:
         """The drawing of a project, made when it is new."""

@@ -6,6 +6,8 @@ import json
 import math
 import re
 import runpy
+import sys
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -139,6 +141,26 @@ def test_both_configurations_of_a_motor_follow_their_targets():
     events = solved(project, fit=True)
     assert max(map(abs, only(events, "fitted")[0]["misfits"])) < 0.01
     assert {event["curve"] for event in only(events, "curve") if event["iterate"] is None} == {0, 1}
+
+
+def test_a_solve_whose_time_is_over_keeps_the_last_iterate_and_tells_its_reason_and_remedy(finished, monkeypatch):
+    project, _ = finished
+    other = edited(project, [{"kind": "set", "path": ["targets", 1, "displacement"], "value": 7.5}])
+    events, now = [], time.perf_counter
+
+    def late():
+        return now() + 1000.0 * (len(only(events, "iterate")) > 1)
+
+    monkeypatch.setattr(sys.modules["fenicsmech.live.solver"], "perf_counter", late)
+    solver = Solver(events.append)
+    solver.run({"task": 1, "kind": "solve", "project": other, "fit": True, "longest": 600.0})
+    failed, iterates = events[-1], only(events, "iterate")
+    assert len(iterates) == 2 and iterates[-1]["design"]["offsets"] != project["design"]["offsets"]
+    assert failed["part"] == "time limit" and "longer than 600 s" in failed["problem"]
+    assert "larger elements" in failed["remedy"]
+    events.clear()
+    solver.run({"task": 2, "kind": "push", "curve": 0, "force": 0.2, "project": project, "fit": False})
+    assert events[-1]["event"] == "done"
 
 
 def test_a_push_moves_as_far_as_the_curve_says(finished):
