@@ -16,16 +16,6 @@ class TooLong(Exception):
     """The time of a task is over."""
 
 
-def too_long(seconds: float) -> dict[str, str]:
-    """What is told of a solve whose time is over: part, problem and remedy."""
-    remedy = "Choose larger elements, fewer frames or smaller loads, and solve again; what was found before stays"
-    return {
-        "part": "time limit",
-        "problem": f"the solve takes longer than {seconds:g} s and was ended",
-        "remedy": remedy,
-    }
-
-
 @dataclass(frozen=True)
 class Cancellable(LinearMethod):
     """The method by size, whose solvers call ``check`` before they factor.

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
-from fenicsmech.live.cancel import too_long
+from fenicsmech.live.told import too_long
 
 _LONGEST = 2**27  # bytes of an event
 

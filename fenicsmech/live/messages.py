@@ -48,7 +48,8 @@ Solver to server, a line each, with the number of their task:
     errors    curve, errors: estimated discretisation errors of the displacements of its points, or of the forces where
                   displacements are held, to be added; peak of the stress at its end, outside of singular places:
                   {value, error, link}, null if there is none
-    fitted    design, misfits, reason, converged, iterations
+    fitted    design, misfits, iterations, missed: {problem, remedy} of targets out of reach or an early end, null if
+              all is well
     linear    the linear preview at a design, Q(p + s) ≈ Q + e + J s, R ≈ ∂R/∂p s + ½ sᵀ ∂²R/∂p² s:
                   design, lengths (typical change of each parameter), curves: [{forces, values, errors, jacobian}],
                   gradient, curvature, active (bounds that hold it back), whole (not cut where a curve snaps),

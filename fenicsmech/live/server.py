@@ -24,7 +24,6 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.live.cancel import too_long
 from fenicsmech.live.job import Job, events
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
 from fenicsmech.live.project import MOST_CURVES, MOST_TARGETS, Project, example_names, materials
@@ -32,6 +31,7 @@ from fenicsmech.live.schema import Refused
 from fenicsmech.live.script import script
 from fenicsmech.live.session import Session
 from fenicsmech.live.stored import StoredResults, user_cache
+from fenicsmech.live.told import too_long
 from fenicsmech.log import logger
 
 if TYPE_CHECKING:

@@ -18,6 +18,7 @@ import numpy as np
 from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
 from fenicsmech.live.build import draw, placement
 from fenicsmech.live.project import Project, forces_of
+from fenicsmech.live.told import remarks, told
 from fenicsmech.simulation import Frame, MechanismPlotter, Simulation, gather, outer_surface
 from fenicsmech.stress import von_mises
 
@@ -62,15 +63,15 @@ def solve_solid(project: Project, number: int, emit: Callable[[dict[str, Any]], 
                 "state": "solved",
                 "curve": number,
                 "project": project,
-                "remarks": [] if curve is None else list(curve.remarks),
-                "failed": failure and _told(failure),
+                "remarks": [] if curve is None else remarks(curve),
+                "failed": failure and told(failure),
                 "errors": errors,
                 "seconds": round(perf_counter() - began, 2),
                 **(_surface(simulation, frames) if frames else {"triangles": "", "points": []}),
             }
         )
     except FenicsmechError as error:
-        emit({"event": "solid", "state": "failed", **_told(error)})
+        emit({"event": "solid", "state": "failed", **told(error)})
 
 
 def _check_size(simulation: Simulation, frames: int) -> None:
@@ -123,10 +124,6 @@ def _surface(simulation: Simulation, frames: tuple[Frame, ...]) -> dict[str, Any
 
 def _packed(values: np.ndarray, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode()
-
-
-def _told(error: FenicsmechError) -> dict[str, str]:
-    return {"part": error.part, "problem": error.problem, "remedy": error.remedy}
 
 
 def main() -> None:

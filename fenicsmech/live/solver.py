@@ -23,8 +23,9 @@ from fenicsmech.design import DesignIterate, DesignProblem, HandlePlacement, Lev
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import EquilibriumError, FenicsmechError
 from fenicsmech.live.build import Drawing, draw, placement
-from fenicsmech.live.cancel import Cancellable, Cancelled, TooLong, too_long
+from fenicsmech.live.cancel import Cancellable, Cancelled, TooLong
 from fenicsmech.live.project import Project, drawing, forces_of
+from fenicsmech.live.told import missed, remarks, told, too_long
 from fenicsmech.plot import MechanismShape
 from fenicsmech.polygons import edge_loops
 from fenicsmech.simulation import Frame, MechanismPlotter, Simulation, gather
@@ -71,7 +72,7 @@ class Solver:
         except TooLong:
             emit({"event": "failed", **too_long(longest)})
         except FenicsmechError as error:
-            emit({"event": "failed", **_told(error)})
+            emit({"event": "failed", **told(error)})
         except Exception as error:  # whatever happens here, the next gesture is answered
             reason = f"{type(error).__name__}: {error}"
             emit({"event": "failed", "part": "solver", "problem": reason[:400], "remedy": "Undo the last change"})
@@ -140,8 +141,7 @@ class Work:
                     "event": "fitted",
                     "design": _design(own, at),
                     "misfits": _rounded([target.error for target in result.targets]),
-                    "reason": result.reason,
-                    "converged": result.converged,
+                    "missed": missed(result),
                     "iterations": result.iterations,
                 }
             )
@@ -197,8 +197,8 @@ class Work:
                     "curve": number,
                     "iterate": iterate,
                     "points": [self._point(own) for own in frames],
-                    "remarks": [] if curve is None else list(curve.remarks),
-                    "failed": failure and _told(failure),
+                    "remarks": [] if curve is None else remarks(curve),
+                    "failed": failure and told(failure),
                 }
             )
             if iterate is None:
@@ -270,7 +270,7 @@ class Work:
         try:
             found = problem.linearise(problem.initial if at is None else at)
         except EquilibriumError as error:
-            self._emit({"event": "required", "values": [], "failed": _told(error)})
+            self._emit({"event": "required", "values": [], "failed": told(error)})
             return
         rows = np.split(found.values + found.errors, np.cumsum([target.size for target in problem.targets])[:-1])
         wanted = rows[len(self._project["targets"]) :]
@@ -329,10 +329,6 @@ def _turned(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def _design(problem: DesignProblem, at: HandlePlacement) -> dict[str, list[float]]:
     return {"offsets": (at.p - problem.initial).tolist(), "handles": at.theta.tolist()}
-
-
-def _told(error: FenicsmechError) -> dict[str, str]:
-    return {"part": error.part, "problem": error.problem, "remedy": error.remedy}
 
 
 def _number(value: float) -> float | None:

@@ -31,8 +31,7 @@ def demo(name):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [name if name in ("switch", "gripper") else pytest.param(name, marks=pytest.mark.thorough) for name in DEMOS],
+    "name", [name if name == "switch" else pytest.param(name, marks=pytest.mark.thorough) for name in DEMOS]
 )
 def test_the_problem_of_a_demo_is_opened_with_its_targets_and_its_curves(name):
     problem = demo(name)
@@ -182,6 +181,7 @@ def test_joints_that_only_space_has_keep_the_project_in_space():
     assert drawing.simulation.fidelity == sim.fidelity
 
 
+@pytest.mark.thorough
 def test_a_link_from_a_file_takes_its_file_along(tmp_path):
     module = import_module("demos.truss")
     described = module.describe(Path("meshes/diagonal.step"))

@@ -358,6 +358,7 @@ print("ended", file=sys.stderr)
 """
 
 
+@pytest.mark.thorough
 def test_a_script_serves_its_problem_here_alone_under_a_token_until_it_is_interrupted():
     pipe = subprocess.PIPE
     with subprocess.Popen([sys.executable, "-c", SCRIPT], stdout=pipe, stderr=pipe, text=True) as process:

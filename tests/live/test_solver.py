@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fenicsmech.live import Solver, edited, example, export, script
+import fenicsmech as fm
+from fenicsmech.live import Solver, edited, example, export, project_of, script
 
 
 def solved(project, *, fit=False, cancelled=lambda events: False, kind="solve", **more):
@@ -26,6 +27,9 @@ def solved(project, *, fit=False, cancelled=lambda events: False, kind="solve", 
     )
     solver.run({"task": 1, "kind": kind, "project": project, "fit": fit, **more})
     return events
+
+
+HELD = {"held": True, "largest": 15.0, "steps": 5}  # mm
 
 
 def only(events, name):
@@ -124,9 +128,38 @@ def test_a_snap_is_told_with_its_force_and_the_preview_ends_before_it():
     (before, after) = next(pair for pair in pairwise(curve["points"]) if pair[1]["snapped"])
     assert after["displacement"] > 5.0 * before["displacement"]
     assert "snaps after force" in curve["remarks"][0] and curve["failed"] is None
+    assert "Make the largest force smaller" in curve["remarks"][0]
     assert not linear["whole"] and linear["curves"][0]["forces"][-1] == before["force"]
     # the curve is that of the drawn strip, the preview that of its spline
     assert linear["curves"][0]["values"][-1] == pytest.approx(before["displacement"], rel=0.02)
+
+
+def test_an_unstable_part_is_told_with_its_remedy_and_ends_the_preview():
+    change = {"kind": "set", "path": ["simulation", "order"], "value": 1}
+    held = {"kind": "set", "path": ["curves", 0], "value": {**example("snapping-switch")["curves"][0], **HELD}}
+    clear = [{"kind": "remove", "path": ["targets", 0]}] * len(example("snapping-switch")["targets"])
+    events = solved(edited(example("snapping-switch"), [change, *clear, held]))
+    (curve,) = only(events, "curve")
+    assert not all(point["stable"] for point in curve["points"])
+    assert (
+        "unstable under dead loads" in curve["remarks"][-1] and "Make the largest force smaller" in curve["remarks"][-1]
+    )
+
+
+@pytest.mark.thorough
+def test_a_target_out_of_reach_is_told_with_its_reason_remedy_and_bounds():
+    beam = fm.Mechanism("beam")
+    ground = beam.rigid("ground", fixed=True)
+    leaf = beam.flexible("leaf", fm.strip([(0, 0), (40, 0)], thickness=2.0, depth=5.0), fm.ONYX)
+    beam.weld(ground, leaf, at=(0, 0), interface_radius=2.0)
+    pull = beam.force(on=leaf, at=(40, 0), direction=(0, 1))
+    sim = fm.Simulation(fm.Scene(beam), space="plane-stress", size=2.0, order=1)
+    design, target = fm.SplineDesign(leaf, 1, thickness=(1.9, 2.1)), fm.Target(pull, force=0.1, displacement=0.05)
+    events = solved(project_of(fm.DesignProblem(sim, [design], targets=[target])), fit=True)
+    (fitted,), (linear,) = only(events, "fitted"), only(events, "linear")
+    missed = fitted["missed"]
+    assert "targets are missed by up to" in missed["problem"] and "Relax a target" in missed["remedy"]
+    assert any("thickness" in bound for bound in linear["active"])
 
 
 @pytest.mark.thorough

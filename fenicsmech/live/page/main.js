@@ -120,11 +120,10 @@ const receivers = {
     view.fit(); show(); chart.draw(); listTargets();
   },
   errors({ curve, errors, peak }) { store.errors[curve] = errors; store.peaks[curve] = peak; chart.draw(); listTargets(); },
-  fitted({ misfits, reason, converged, design }) {
+  fitted({ misfits, missed, design }) {
     store.project.design = design;
     store.misfits = misfits;
-    const missed = misfits.some((own) => Math.abs(own) > 0.01);
-    if (missed || !converged) tell(`Targets are missed by up to ${figure(100 * Math.max(...misfits.map(Math.abs)), 2)} %: ${reason}. Relax a target, widen the thicknesses, or move a joint.`, true);
+    if (missed) tell(`${missed.problem[0].toUpperCase()}${missed.problem.slice(1)}. ${missed.remedy}.`, true);
     listTargets();
   },
   required({ values, failed }) {
