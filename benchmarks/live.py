@@ -5,9 +5,8 @@
 A frame is the median time of one frame of the truss finger's curve in plane stress, measured before each value that is
 given in frames: other work on the machine slows down both. The server and its solver are processes of their own, as
 ``python3 -m fenicsmech.live`` starts them, with the bytecode that the first start leaves; the browser is Debian's
-Chromium without a screen. In the browser times are
-the page's own, from the release of the pointer on; previews are counted as they are drawn, in a drag that moves with
-every frame of the screen.
+Chromium without a screen. In the browser times are the page's own, from the release of the pointer on; previews are
+counted as they are drawn, in a drag that moves with every frame of the screen.
 """
 
 import asyncio

@@ -119,7 +119,7 @@ from fenicsmech.laws import (
     Volumetric,
     Yeoh,
 )
-from fenicsmech.live import live
+from fenicsmech.live import ServerOptions, live
 from fenicsmech.log import configure_logging, print_once
 from fenicsmech.mechanism import (
     DRAWN,
@@ -294,7 +294,7 @@ __all__ = [
     "fit_modulus", "fit_parameters", "ParameterFit", "ParameterFitOptions",
     "SpecimenTest", "fit_law", "LawFit", "LawFitOptions", "specimen_stress", "Design",
     # the live page
-    "live",
+    "live", "ServerOptions",
     # numbers that designs change in addition to shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
     "TemperatureChange",

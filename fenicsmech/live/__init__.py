@@ -45,7 +45,12 @@ from fenicsmech.live.solver import Solver
 
 
 def live(
-    problem: DesignProblem | Project, *, result: DesignResult | None = None, port: int = 0, browse: bool = True
+    problem: DesignProblem | Project,
+    *,
+    result: DesignResult | None = None,
+    port: int = 0,
+    browse: bool = True,
+    options: ServerOptions | None = None,
 ) -> None:
     """Opens the live page of a design problem in a browser, and serves it until interrupted.
 
@@ -57,6 +62,7 @@ def live(
         result: of the problem, whose shape is opened; the drawn one by default.
         port: of 127.0.0.1; a free one by default.
         browse: whether a browser is opened; otherwise the address is printed alone.
+        options: of the server, such as its limits of time, with its port.
 
     Raises:
         DescriptionError: a part of the problem has no plain data, as a function of the script's own, the result belongs
@@ -68,4 +74,4 @@ def live(
         raise DescriptionError("live page", "a result is given with a project", "Give the problem of the result")
     else:
         project = problem
-    serve(project, options=ServerOptions(port=port), browse=browse)
+    serve(project, options=options or ServerOptions(port=port), browse=browse)

@@ -243,6 +243,19 @@ def test_a_project_is_exported_as_files_that_others_read(finished, what, names, 
                 assert picture.format != "GIF" or picture.n_frames == there_and_back
 
 
+@pytest.mark.thorough
+def test_pictures_and_animations_are_made_of_every_curve(tmp_path):
+    project = example("four-bar-with-a-motor")
+    project = edited(project, [{"kind": "set", "path": ["curves", k, "steps"], "value": 2} for k in range(2)])
+    for what, names in (
+        ("png", ["curve-1.png", "mechanism-1.png", "curve-2.png", "mechanism-2.png"]),
+        ("animation", ["animation-1.gif", "animation-2.gif"]),
+    ):
+        paths = export(project, what, tmp_path)
+        assert [path.name for path in paths] == names
+        assert len({path.read_bytes() for path in paths}) == len(paths)
+
+
 def test_names_of_a_project_cannot_put_code_into_its_script(finished, tmp_path):
     project, _ = finished
     name = '"""+__import__("os").system("x")+"""'
