@@ -36,6 +36,9 @@ def solve_solid(project: Project, number: int, emit: Callable[[dict[str, Any]], 
     """
     began = perf_counter()
     try:
+        if project["simulation"]["space"] not in ("plane-stress", "plane-strain"):
+            reason = "this mechanism does not exist in the plane, and its curves are those in space already"
+            raise DescriptionError("solid", reason, "Look at the curves of the page")
         drawing = draw({**project, "simulation": {**project["simulation"], "space": "3d-symmetric"}})
         problem = drawing.along_curves(project)
         at = placement(project, problem)

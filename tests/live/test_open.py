@@ -11,7 +11,18 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
-from fenicsmech.live import Refused, Solver, draw, example, forces_of, live, project_of, read_project, script
+from fenicsmech.live import (
+    Refused,
+    Solver,
+    draw,
+    example,
+    forces_of,
+    live,
+    project_of,
+    read_project,
+    script,
+    solve_solid,
+)
 
 DEMOS = ("switch", "constant_force", "gripper", "suspension", "claw", "truss", "klann")
 
@@ -163,22 +174,41 @@ def test_what_the_page_cannot_edit_is_carried_through_project_and_script(tmp_pat
     same(runpy.run_path(str(tmp_path / "design.py"))["problem"], problem)
 
 
-def test_joints_that_only_space_has_keep_the_project_in_space():
+def ball():
+    """A problem with joints that only space has."""
     made = fm.Mechanism("ball")
     ground, rod = made.rigid("ground", fixed=True), made.rigid("rod")
     beam = made.flexible("beam", fm.strip([(0, 0), (40, 0)], thickness=3.0, depth=4.0), fm.ONYX)
     made.weld(ground, beam, at=(2, 0), region=fm.Rectangle(4.0, 3.0))
     made.spherical(beam, rod, at=(38, 0, 0), interface_radius=1.0)
     made.universal(rod, ground, at=(38, 20, 5), axis=(0, 1, 0))
-    push = made.force(on=beam, at=(30, 0, 2), direction=(0, 0, 1), name="push")
+    push = made.force(on=beam, at=(20, 0, 1), direction=(0, 0, 1), name="push")
     sim = fm.Simulation(fm.Scene(made), space="3d", size=3.0, order=1, layers=2)
     targets = [fm.Target(push, force=0.1, displacement=0.2)]
-    problem = fm.DesignProblem(sim, [fm.SplineDesign(beam, 1)], targets=targets)
+    return fm.DesignProblem(sim, [fm.SplineDesign(beam, 1)], targets=targets)
+
+
+def test_joints_that_only_space_has_keep_the_project_in_space():
+    problem = ball()
     project, drawing = reopened(problem)
-    assert project["simulation"]["space"] == "3d"
-    assert drawing.simulation.scene.mechanism.joints == made.joints
-    assert drawing.simulation.scene.mechanism.forces == made.forces
-    assert drawing.simulation.fidelity == sim.fidelity
+    found, given = drawing.simulation, problem.simulation
+    assert project["simulation"]["space"] == "3d" and found.fidelity == given.fidelity
+    assert found.scene.mechanism.joints == given.scene.mechanism.joints
+    assert found.scene.mechanism.forces == given.scene.mechanism.forces
+
+
+@pytest.mark.thorough
+def test_a_project_in_space_is_solved_and_drawn_there_and_not_once_more_as_a_solid():
+    project, drawing = reopened(ball())
+    project["curves"][0]["steps"] = 2
+    events, solid = [], []
+    Solver(events.append).run({"task": 1, "kind": "solve", "project": project, "fit": False})
+    (curve,) = (event for event in events if event["event"] == "curve")
+    found = drawing.simulation.compute(drawing.request(project, 0, forces_of(project, 0)))
+    assert [point["displacement"] for point in curve["points"]] == pytest.approx(found.displacements, rel=1e-5)
+    assert all(len(point["nodes"][0]) > 100 for point in curve["points"])
+    solve_solid(project, 0, solid.append)
+    assert solid[0]["state"] == "failed" and "in space already" in solid[0]["problem"]
 
 
 @pytest.mark.thorough
