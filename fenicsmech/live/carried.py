@@ -43,8 +43,8 @@ from fenicsmech.laws import (
     TransverselyIsotropic,
     Yeoh,
 )
+from fenicsmech.live.schema import LONGEST_NAME, Refused, Schema, Text
 from fenicsmech.live.schema import Number as Finite
-from fenicsmech.live.schema import Refused, Schema, Text
 from fenicsmech.mechanism import (
     DRAWN,
     Arc,
@@ -139,7 +139,7 @@ _ATTRIBUTES: Mapping[tuple[type, str], str] = {(JointPosition, "direction"): "ve
 _SHORT = {(Material, "E"), (Material, "nu"), *((Target, name) for name in ("force", "displacement", "configuration"))}
 
 _DEEPEST = 9  # records and lists in one another
-_LONGEST = 300  # entries of a list
+_LONGEST = 1000  # entries of a list
 
 
 def plain(value: Any) -> Any:
@@ -296,7 +296,7 @@ class Carried(Schema):
         elif set(value) == {"part", "name"}:
             if value["part"] not in SORTS.values():
                 raise Refused(place, "there are no such parts")
-            Text().check(value["name"], place)
+            Text(LONGEST_NAME).check(value["name"], place)
         else:
             kind = KINDS.get(value["is"]) if isinstance(value.get("is"), str) else None
             if kind is None:

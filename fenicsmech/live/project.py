@@ -25,6 +25,7 @@ from fenicsmech.joints import JOINT_KINDS
 from fenicsmech.live.carried import EFFECTS, REGIONS, REGULARISERS, Carried, references
 from fenicsmech.live.schema import (
     FLAG,
+    LONGEST_NAME,
     ByEntry,
     ByKind,
     Choice,
@@ -58,7 +59,7 @@ _COORDINATE = Number(-1e5, 1e5)
 _LENGTH = Number(1e-3, 1e5)
 _POINT = Many(_COORDINATE, 2, 2)
 _VECTOR = Many(_COORDINATE, 2, 3)
-_NAME = Text(60)
+_NAME = Text(LONGEST_NAME)
 _CURVE = Number(0, MOST_CURVES - 1, whole=True)
 
 # the authors' materials beside those of cards
@@ -97,8 +98,8 @@ _MATERIAL = TextOr(
 )
 _SHAPE = ByKind(
     {
-        "strip": Record({"line": Many(_POINT, 2, 20), "thickness": _LENGTH, "depth": _LENGTH}),
-        "polygon": Record({"corners": Many(_POINT, 3, 100), "depth": _LENGTH}),
+        "strip": Record({"line": Many(_POINT, 2, 100), "thickness": _LENGTH, "depth": _LENGTH}),
+        "polygon": Record({"corners": Many(_POINT, 3, 1000), "depth": _LENGTH}),
         "outline": Record({"data": Carried((Outline,)), "depth": _LENGTH}),
         # a file with its content, compressed, in base64
         "step": Record({"name": _NAME, "content": Text(LARGEST_FILE), "depth": _LENGTH, "section": _COORDINATE}),
@@ -166,9 +167,9 @@ PROJECT = Record(
         "format": Choice((FORMAT,)),
         "name": _NAME,
         "links": Many(_LINK, 2, MOST_LINKS),
-        "joints": Many(_JOINT, 1, 40),
-        "motors": Many(Record({"name": _NAME, "joint": _NAME}), 0, 10),
-        "forces": Many(_LOAD, 1, 10),
+        "joints": Many(_JOINT, 1, 80),
+        "motors": Many(Record({"name": _NAME, "joint": _NAME}), 0, 20),
+        "forces": Many(_LOAD, 1, 20),
         "effects": Many(_EFFECT, 0, 20),
         "curves": Many(
             Record(

@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+LONGEST_NAME = 160
+"""Characters of a part's name: joints are named by kind, links and place where a script gives no name."""
+
 
 class Refused(Exception):
     """Data that do not fit their schema.
@@ -175,7 +178,7 @@ class Mapped(Schema):
         if not isinstance(value, dict) or len(value) > self.most:
             raise Refused(place, f"not a mapping of at most {self.most}")
         for name, own in value.items():
-            Text().check(name, place)
+            Text(LONGEST_NAME).check(name, place)
             self.of.check(own, f"{place}.{name}".lstrip("."))
 
 

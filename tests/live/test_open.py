@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import random
 import runpy
+from contextlib import suppress
+from copy import deepcopy
 from importlib import import_module
 from pathlib import Path
 
@@ -172,6 +175,32 @@ def test_what_the_page_cannot_edit_is_carried_through_project_and_script(tmp_pat
     described, _, _ = script(project).partition("\n\ncurve_0 = ")
     (tmp_path / "design.py").write_text(described)
     same(runpy.run_path(str(tmp_path / "design.py"))["problem"], problem)
+
+
+STRANGE = [None, True, -1, 1e300, "x", "", [], {}, {"is": "Target"}, {"part": "links", "name": "leaf"}, {"pairs": []}]
+
+
+def places(data, path=()):
+    """The paths of all values in plain data."""
+    yield path
+    for key in data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ():
+        yield from places(data[key], (*path, key))
+
+
+@pytest.mark.thorough
+def test_a_project_that_is_changed_anyhow_is_refused_or_has_a_script():
+    base, rng, read = project_of(many()), random.Random(0), 0
+    for _ in range(400):
+        project = deepcopy(base)
+        *way, last = rng.choice([path for path in places(project) if path])
+        at = project
+        for step in way:
+            at = at[step]
+        at[last] = deepcopy(rng.choice(STRANGE))
+        with suppress(Refused):
+            compile(script(read_project(project)), "script", "exec")
+            read += 1
+    assert 10 < read < 200
 
 
 def ball():
