@@ -51,6 +51,7 @@ Project = dict[str, Any]
 MOST_LINKS = 24
 MOST_CURVES = 12
 MOST_TARGETS = 40
+MOST_ADDED = {"curves": 4, "targets": 12}  # up to which the page adds; scripts bring more
 MOST_ELEMENTS = 10_000  # triangles of a mesh, which the page draws in each of up to 160 frames
 LARGEST_FILE = 600_000  # characters of the content of a link's file
 MOST_PARAMETERS = MOST_LINKS * 100 * 2  # of a design: two coordinates of each handle

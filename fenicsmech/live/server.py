@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 from fenicsmech.errors import DescriptionError
 from fenicsmech.live.job import Job, events
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
-from fenicsmech.live.project import MOST_CURVES, MOST_TARGETS, Project, example_names, materials
+from fenicsmech.live.project import MOST_ADDED, Project, example_names, materials
 from fenicsmech.live.schema import Refused
 from fenicsmech.live.script import script
 from fenicsmech.live.session import Session
@@ -373,7 +373,7 @@ class Server:
             "opened": self.session.opened,
             "examples": example_names(),
             "materials": materials(),
-            "most": {"curves": MOST_CURVES, "targets": MOST_TARGETS},
+            "most": MOST_ADDED,
         }
 
     def _first_event(self) -> dict[str, Any]:

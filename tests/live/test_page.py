@@ -361,7 +361,7 @@ def test_a_curve_of_a_new_force_is_added_dragged_and_removed(page):
     choose(page, "move")
 
 
-def test_the_button_for_curves_rests_at_the_last_that_a_project_may_have(page):
+def test_the_button_for_curves_rests_at_the_last_that_the_page_adds(page):
     add = page.chrome.find_element(By.ID, "add-curve")
     for count in (2, 3, 4):
         add.click()
