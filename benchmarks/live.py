@@ -4,13 +4,14 @@
 
 A frame is the median time of one frame of the truss finger's curve in plane stress, measured before each value that is
 given in frames: other work on the machine slows down both. The server and its solver are processes of their own, as
-``python3 -m fenicsmech.live`` starts them; the browser is Debian's Chromium without a screen. In the browser times are
-the page's own, from the release of the pointer on; previews are counted as they are drawn, in a drag that moves with
-every frame of the screen.
+``python3 -m fenicsmech.live`` starts them, with the bytecode that the first start leaves; the browser is Debian's
+Chromium without a screen. In the browser times are the page's own, from the release of the pointer on; previews are
+counted as they are drawn, in a drag that moves with every frame of the screen.
 """
 
 import asyncio
 import json
+import os
 import random
 import re
 import subprocess
@@ -37,6 +38,9 @@ DRIVER = "/usr/bin/chromedriver"
 OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=1280,800")
 HEADERS = ("figure", "median", "worst", "unit", "median in frames", "worst in frames", "wanted")
 LONGEST = 300.0  # s, of anything that is waited for
+# bytecode is kept, whatever the environment says
+BYTECODE = TemporaryDirectory()
+ENVIRONMENT = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": BYTECODE.name}
 
 # times of the page itself after a release, and previews drawn while the pointer moves with the screen
 WATCH = """
@@ -127,7 +131,7 @@ def running(project: Path | None = None) -> Iterator[Running]:
     """``python3 -m fenicsmech.live``, until the end of the block."""
     arguments = [] if project is None else [str(project)]
     line = [sys.executable, "-m", "fenicsmech.live", "--no-browser", *arguments]
-    process = subprocess.Popen(line, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(line, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
     try:
         assert process.stdout is not None, "it is a pipe"
         yield Running(process, process.stdout.readline().split()[-1])

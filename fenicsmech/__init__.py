@@ -23,6 +23,7 @@ from fenicsmech.design import (
     DesignProblem,
     DesignResult,
     Experiment,
+    HandlePlacement,
     LawFit,
     LawFitOptions,
     LevenbergMarquardt,
@@ -119,7 +120,7 @@ from fenicsmech.laws import (
     Volumetric,
     Yeoh,
 )
-from fenicsmech.live import live
+from fenicsmech.live import ServerOptions, live
 from fenicsmech.log import configure_logging, print_once
 from fenicsmech.mechanism import (
     DRAWN,
@@ -289,12 +290,12 @@ __all__ = [
     # design and characterisation
     "DesignProblem", "SplineDesign", "ShapeBounds", "Target", "limits", "StayClose", "MeshQuality", "Regulariser",
     "LevenbergMarquardt", "BFGS", "SQP", "Optimiser", "Correction", "DesignResult", "LinkDesign", "TargetResult",
-    "DesignIterate", "DesignLinearisation",
+    "DesignIterate", "DesignLinearisation", "HandlePlacement",
     "PartValue", "Scatter", "SearchResult", "StartResult", "Optimisation", "design_study", "Experiment", "ModulusFit",
     "fit_modulus", "fit_parameters", "ParameterFit", "ParameterFitOptions",
     "SpecimenTest", "fit_law", "LawFit", "LawFitOptions", "specimen_stress", "Design",
     # the live page
-    "live",
+    "live", "ServerOptions",
     # numbers that designs change in addition to shapes; NumberKind for kinds of your own
     "Number", "Depth", "LawParameter", "SpringStiffness", "SpringRest", "MotorOffset", "JointPosition", "JointAxis",
     "TemperatureChange",

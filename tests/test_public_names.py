@@ -26,7 +26,6 @@ INNER = {
     "ElasticBody",
     "Equilibrium",
     "Estimates",
-    "HandlePlacement",
     "Spin",
     "InterfaceMap",
     "Iterate",

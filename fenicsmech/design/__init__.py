@@ -20,7 +20,7 @@ from fenicsmech.design.characterisation import (
 )
 from fenicsmech.design.correction import Correction
 from fenicsmech.design.description import Bounds, SplineDesign, shape_request, with_followers
-from fenicsmech.design.design_problem import DesignLinearisation, DesignProblem
+from fenicsmech.design.design_problem import DEFAULT_REGULARISER, DesignLinearisation, DesignProblem
 from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.law_fit import LawFit, LawFitOptions, SpecimenTest, fit_law
 from fenicsmech.design.numbers import Number, NumberDesign, ScaledNumbers
@@ -42,7 +42,15 @@ from fenicsmech.design.optimisers.problem import (
     TooHigh,
 )
 from fenicsmech.design.optimisers.sqp import SQP
-from fenicsmech.design.regularisers import MeshQuality, Model, NumberBounds, Regulariser, ShapeBounds, StayClose
+from fenicsmech.design.regularisers import (
+    MeshQuality,
+    Model,
+    NumberBounds,
+    Regulariser,
+    ShapeBounds,
+    StayClose,
+    Weighted,
+)
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.result import DesignResult, LinkDesign, PartValue, TargetResult, rest_meshes
 from fenicsmech.design.run import Checkpoint, DesignIterate, DesignProgress, Round, minimise_together

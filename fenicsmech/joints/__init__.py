@@ -7,6 +7,7 @@
 
 from fenicsmech.joints.joint import (
     CYLINDRICAL,
+    JOINT_KINDS,
     PLANAR_JOINT,
     PRISMATIC,
     REVOLUTE,

@@ -249,6 +249,9 @@ UNIVERSAL = Universal()
 PLANAR_JOINT = PlanarJoint()
 WELD = Weld()
 
+JOINT_KINDS = {kind.name: kind for kind in (REVOLUTE, PRISMATIC, CYLINDRICAL, SPHERICAL, UNIVERSAL, PLANAR_JOINT, WELD)}
+"""The kinds of the package by their names."""
+
 
 @cache
 def constraint(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:

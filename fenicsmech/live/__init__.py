@@ -6,18 +6,20 @@
 - ``messages``: what page, server and solver process say to each other
 - ``session``: project, history, and what a gesture leads to
 - ``server``: static files and a WebSocket on 127.0.0.1; ``solver``: the process that computes, ended at any time
-- ``cancel``: equilibria that a new gesture ends at their next iteration
+- ``cancel``: equilibria that a new gesture ends at their next iteration; ``told``: problems with their remedies
 - ``solid``: the process that solves in space; ``job``: runs it
 - ``build``: the simulation and the design problem of a project; ``script``: the Python script that does the same
 - ``stored``: first results for the next start, shown before the solver is up
-- ``describe``: the project of a script's design problem; ``export``: files of a project
+- ``describe``: the project of a script's design problem; ``carried``: what of it the page does not edit, as plain data
+- ``export``: files of a project
 - ``page/``: the page itself, modules without a build step
 
 While a target is dragged the page shows the linear preview, from the last derivatives of the curve; when it rests, the
 solver follows, and every iterate is shown as it comes. The next gesture ends that at its next iteration.
 """
 
-from fenicsmech.design import DesignProblem
+from fenicsmech.design import DesignProblem, DesignResult
+from fenicsmech.errors import DescriptionError
 from fenicsmech.live.build import draw
 from fenicsmech.live.cancel import Cancellable, Cancelled
 from fenicsmech.live.describe import project_of
@@ -42,19 +44,34 @@ from fenicsmech.live.solid import solve_solid
 from fenicsmech.live.solver import Solver
 
 
-def live(problem: DesignProblem | Project, *, port: int = 0, browse: bool = True) -> None:
+def live(
+    problem: DesignProblem | Project,
+    *,
+    result: DesignResult | None = None,
+    port: int = 0,
+    browse: bool = True,
+    options: ServerOptions | None = None,
+) -> None:
     """Opens the live page of a design problem in a browser, and serves it until interrupted.
 
-    The page is at 127.0.0.1, its address has a random token. Problems in 3D are shown in plane stress.
+    The page is at 127.0.0.1, its address has a random token. Problems in 3D that plane stress can describe are shown in
+    plane stress. What the page cannot edit it carries: solved, shown in words, saved, and written to the script.
 
     Args:
-        problem: of links that are strips or polygons, with targets on load–displacement curves; or a project of the
-            page.
+        problem: with a force in the sample of one target at least; or a project of the page.
+        result: of the problem, whose shape is opened; the drawn one by default.
         port: of 127.0.0.1; a free one by default.
         browse: whether a browser is opened; otherwise the address is printed alone.
+        options: of the server, such as its limits of time, with its port.
 
     Raises:
-        DescriptionError: a part of the problem is nothing that the page knows, or aiohttp is missing.
+        DescriptionError: a part of the problem has no plain data, as a function of the script's own, the result belongs
+            to another problem or a project is given with one, or aiohttp is missing.
     """
-    project = project_of(problem) if isinstance(problem, DesignProblem) else problem
-    serve(project, options=ServerOptions(port=port), browse=browse)
+    if isinstance(problem, DesignProblem):
+        project = project_of(problem, result)
+    elif result is not None:
+        raise DescriptionError("live page", "a result is given with a project", "Give the problem of the result")
+    else:
+        project = problem
+    serve(project, options=options or ServerOptions(port=port), browse=browse)

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import base64
+import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
-from fenicsmech.design import DesignProblem, HandlePlacement, SplineDesign, Target
+from fenicsmech.design import DEFAULT_REGULARISER, DesignProblem, HandlePlacement, Number, SplineDesign, Target
 from fenicsmech.effects import Gravity, JointSpring, Temperature
 from fenicsmech.equilibrium import EquilibriumMethod
+from fenicsmech.errors import DescriptionError
+from fenicsmech.joints import JOINT_KINDS
+from fenicsmech.live.carried import made
 from fenicsmech.live.project import PAPER_NAMES, Project, forces_of
 from fenicsmech.mechanism import (
     DRAWN,
@@ -21,23 +30,33 @@ from fenicsmech.mechanism import (
     Effect,
     FlexibleLink,
     Force,
+    ForceGroup,
     Joint,
     Link,
     Material,
     Mechanism,
     Motor,
+    Output,
     Rectangle,
     Region,
     Scene,
     Shape,
+    gmsh_mesh,
     material,
     polygon,
+    step_file,
     strip,
 )
-from fenicsmech.quantities import Displacement, Sample
+from fenicsmech.quantities import Displacement, ForceMagnitude, Sample, at
 from fenicsmech.simulation import CurveRequest, Simulation, read_request
 
 _PAPER = {"SMOOTH_SIL_950": SMOOTH_SIL_950, "ONYX": ONYX}
+
+
+FILES = {"step": "step", "mesh": "msh"}
+"""Endings of the files of links, by the kind of their shape."""
+
+MOST_BYTES = 50_000_000  # of a link's file
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +67,14 @@ class Drawing:
     joints: Mapping[str, Joint]
     motors: Mapping[str, Motor]
     forces: Mapping[str, Force]
+    outputs: Mapping[str, Output]
     simulation: Simulation
     _problems: list[DesignProblem] = field(default_factory=list, init=False)
+
+    @property
+    def parts(self) -> dict[str, Mapping[str, Any]]:
+        """All parts, for what is carried."""
+        return {sort: getattr(self, sort) for sort in ("links", "joints", "motors", "forces", "outputs")}
 
     def configuration(self, curve: Mapping[str, Any]) -> Configuration:
         """That of a curve."""
@@ -57,61 +82,77 @@ class Drawing:
             return DRAWN
         return Configuration(curve["name"], {self.motors[k]: value for k, value in curve["positions"].items()})  # type: ignore[arg-type]
 
-    def request(self, project: Project, number: int, forces: Sequence[float]) -> CurveRequest:
-        """The request of a curve."""
+    def request(self, project: Project, number: int, values: Sequence[float], *, pushed: bool = False) -> CurveRequest:
+        """The request of a curve at its values, displacements where these are held unless it is ``pushed``."""
         curve = project["curves"][number]
+        held = curve.get("held", False) and not pushed
+        part: Force | ForceGroup = self.forces[curve["force"]]
+        if "ratios" in curve and not pushed:
+            part = ForceGroup(curve["name"], {self.forces[name]: own for name, own in curve["ratios"].items()})  # type: ignore[arg-type]
         return read_request(
             self.simulation.scene.mechanism,
-            self.forces[curve["force"]],
-            forces=forces,
-            displacements=None,
+            part,
+            forces=None if held else values,
+            displacements=values if held else None,
             configuration=self.configuration(curve),
             others={self.forces[name]: value for name, value in curve["others"].items()},
         )
 
-    def target(self, project: Project, number: int, force: float, displacement: float, weight: float = 1.0) -> Target:
-        """A target on a curve."""
+    def target(self, project: Project, number: int, value: float, wanted: float, weight: float = 1.0) -> Target:
+        """A target on a curve: the displacement under a force, or the force where displacements are held."""
         curve = project["curves"][number]
         part = self.forces[curve["force"]]
-        loads: dict[Any, Any] = {part: force} | {self.forces[k]: value for k, value in curve["others"].items()}
-        sample = Sample(loads, self.configuration(curve))
-        return Target(Displacement(part), sample, equals=displacement, weight=weight)
+        loads: dict[Any, Any] = {self.forces[k]: own for k, own in curve["others"].items()}
+        if curve.get("held"):
+            sample = Sample({part: at(value)} | loads, self.configuration(curve))
+            return Target(ForceMagnitude(part), sample, equals=wanted, weight=weight)
+        ratios = curve.get("ratios", {curve["force"]: 1.0})
+        sample = Sample({self.forces[k]: own * value for k, own in ratios.items()} | loads, self.configuration(curve))
+        return Target(Displacement(part), sample, equals=wanted, weight=weight)
 
     def problem(self, project: Project) -> DesignProblem | None:
-        """The design problem of a project's targets; None without targets or designs."""
+        """The design problem of a project's targets and requirements; None without any or without designs."""
         designs = self.designs(project)
         targets = [
             self.target(project, own["curve"], own["force"], own["displacement"], own["weight"])
             for own in project["targets"]
         ]
-        return self._problem(designs, targets) if designs and targets else None
+        targets += [made(own["data"], self.parts) for own in project.get("requirements", ())]
+        return self._problem(project, designs, targets) if designs and targets else None
 
-    def along_curves(self, project: Project, forces: Sequence[Sequence[float]] | None = None) -> DesignProblem | None:
-        """The problem whose quantities are displacements: of all frames of all curves, or at some ``forces`` of each;
-        None without designs."""
+    def along_curves(self, project: Project, values: Sequence[Sequence[float]] | None = None) -> DesignProblem | None:
+        """The problem whose quantities are those of all frames of all curves, or at some ``values`` of each; None
+        without designs."""
         designs = self.designs(project)
-        forces = forces or [forces_of(project, number) for number in range(len(project["curves"]))]
-        targets = [
-            self.target(project, number, force, 1.0) for number, own in enumerate(forces) for force in own if force
-        ]
-        return self._problem(designs, targets) if designs else None
+        values = values or [forces_of(project, number) for number in range(len(project["curves"]))]
+        pairs = [(number, value) for number, own in enumerate(values) for value in own if value]
+        targets = [self.target(project, number, value, 1.0) for number, value in pairs]
+        return self._problem(project, designs, targets) if designs else None
 
-    def _problem(self, designs: Sequence[SplineDesign], targets: Sequence[Target]) -> DesignProblem:
+    def _problem(
+        self, project: Project, designs: Sequence[SplineDesign | Number], targets: Sequence[Target]
+    ) -> DesignProblem:
         """A problem that shares the handles of the first one: links that change are part of the drawing."""
         if self._problems:
             return self._problems[0].with_targets(targets)
-        self._problems.append(DesignProblem(self.simulation, designs, targets=targets))
+        own = project.get("regulariser")
+        regulariser = DEFAULT_REGULARISER if own is None else made(own, self.parts)
+        self._problems.append(DesignProblem(self.simulation, designs, targets=targets, regulariser=regulariser))
         return self._problems[0]
 
-    def designs(self, project: Project) -> list[SplineDesign]:
-        """The links whose shape changes."""
-        found = []
+    def designs(self, project: Project) -> list[SplineDesign | Number]:
+        """The links whose shape changes, and the numbers that do."""
+        found: list[SplineDesign | Number] = []
         for own in project["links"]:
             if own["kind"] == "flexible" and own["design"] is not None:
-                link, bounds = self.links[own["name"]], own["design"]["thickness"]
+                given = dict(own["design"])
+                segments, bounds = given.pop("segments"), given.pop("thickness")
+                for key in {"same", "mirrored"} & given.keys():
+                    given[key] = [self.links[name] for name in given[key]]
+                link = self.links[own["name"]]
                 assert isinstance(link, FlexibleLink), "the project says so"
-                found.append(SplineDesign(link, own["design"]["segments"], thickness=bounds and tuple(bounds)))
-        return found
+                found.append(SplineDesign(link, segments, thickness=bounds and tuple(bounds), **given))
+        return [*found, *(made(own["data"], self.parts) for own in project.get("numbers", ()))]
 
 
 def draw(project: Project, method: EquilibriumMethod | None = None) -> Drawing:
@@ -126,24 +167,31 @@ def draw(project: Project, method: EquilibriumMethod | None = None) -> Drawing:
     """
     mechanism = Mechanism(project["name"])
     links: dict[str, Link] = {}
-    for own in project["links"]:
+    filed = any("content" in own.get("shape", ()) for own in project["links"])
+    folder = Path(mkdtemp(prefix="fenicsmech-")) if filed else None
+    for k, own in enumerate(project["links"]):
         if own["kind"] == "rigid":
             links[own["name"]] = mechanism.rigid(own["name"], fixed=own["fixed"])
         else:
-            made = mechanism.flexible(own["name"], _shape(own["shape"]), material_of(own["material"]))
-            links[own["name"]] = made
+            shape = _shape(own["shape"], folder and folder / f"{k}")
+            links[own["name"]] = mechanism.flexible(own["name"], shape, material_of(own["material"]))
     joints = {own["name"]: _join(mechanism, links, own) for own in project["joints"]}
     motors = {own["name"]: mechanism.motor(joints[own["joint"]], name=own["name"]) for own in project["motors"]}
-    forces = {
-        own["name"]: mechanism.force(on=links[own["on"]], at=own["at"], direction=own["direction"], name=own["name"])
-        for own in project["forces"]
-    }
-    effects = [_effect(own, joints) for own in project["effects"]]
-    options = project["simulation"]
-    simulation = Simulation(
-        Scene(mechanism, effects), space=options["space"], order=options["order"], size=options["size"], solver=method
-    )
-    return Drawing(links, joints, motors, forces, simulation)
+    parts: dict[str, Mapping[str, Any]] = {"links": links, "joints": joints, "motors": motors}
+    forces = {own["name"]: mechanism.force(**_load(own, parts)) for own in project["forces"]}
+    outputs = {own["name"]: mechanism.output(**_load(own, parts)) for own in project.get("outputs", ())}
+    parts |= {"forces": forces, "outputs": outputs}
+    effects = [_effect(own, joints, parts) for own in project["effects"]]
+    options = dict(project["simulation"])
+    if "sizes" in options:
+        ratios = options.pop("sizes")
+        options["size"] = {links[name]: ratio * options["size"] for name, ratio in ratios.items()}
+    options |= {key: made(options[key], parts) for key in ("quadrature", "formulation") if key in options}
+    simulation = Simulation(Scene(mechanism, effects), solver=method, **options)
+    drawing = Drawing(links, joints, motors, forces, outputs, simulation)
+    if folder is not None:  # it is read when links are meshed
+        finalize(drawing, rmtree, folder, ignore_errors=True)
+    return drawing
 
 
 def placement(project: Project, problem: DesignProblem | None) -> HandlePlacement | None:
@@ -156,16 +204,45 @@ def placement(project: Project, problem: DesignProblem | None) -> HandlePlacemen
 
 def material_of(own: str | Mapping[str, Any]) -> Material:
     """A material by its name in ``materials()``, or with its numbers."""
-    if not isinstance(own, str):
-        return Material(own["name"], own["E"], own["nu"], density=own["density"])
-    name = own
-    return _PAPER[PAPER_NAMES[name]] if name in PAPER_NAMES else material(name)
+    if isinstance(own, str):
+        return _PAPER[PAPER_NAMES[own]] if own in PAPER_NAMES else material(own)
+    if "data" in own:
+        return made(own["data"], {})
+    return Material(own["name"], own["E"], own["nu"], density=own["density"])
 
 
-def _shape(own: Mapping[str, Any]) -> Shape:
+def content_of(shape: Mapping[str, Any]) -> bytes:
+    """The content of a link's file.
+
+    Raises:
+        DescriptionError: it is not compressed as the page does it, or too large.
+    """
+    part, remedy = f"file {shape['name']!r}", "Open a project that was saved by the page"
+    try:
+        reader = zlib.decompressobj()
+        found = reader.decompress(base64.b64decode(shape["content"], validate=True), MOST_BYTES)
+    except (ValueError, zlib.error):
+        raise DescriptionError(part, "its content cannot be read", remedy) from None
+    if reader.unconsumed_tail:
+        problem = f"it has more than {MOST_BYTES} bytes"
+        raise DescriptionError(part, problem, "Give a file with fewer faces or elements")
+    return found
+
+
+def _shape(own: Mapping[str, Any], file: Path | None = None) -> Shape:
+    """The shape of a link; its ``file`` is written where it is from one."""
     if own["kind"] == "strip":
         return strip(own["line"], thickness=own["thickness"], depth=own["depth"])
-    return polygon(own["corners"], depth=own["depth"])
+    if own["kind"] == "polygon":
+        return polygon(own["corners"], depth=own["depth"])
+    if own["kind"] == "outline":
+        return replace(made(own["data"], {}), depth=own["depth"])
+    assert file is not None, "the drawing has a folder"
+    path = file.with_suffix(f".{FILES[own['kind']]}")
+    path.write_bytes(content_of(own))
+    if own["kind"] == "step":
+        return step_file(path, depth=own["depth"], section=own["section"])
+    return gmsh_mesh(path, depth=own["depth"])
 
 
 def _region(own: Mapping[str, Any] | None) -> Region | None:
@@ -175,18 +252,29 @@ def _region(own: Mapping[str, Any] | None) -> Region | None:
 
 
 def _join(mechanism: Mechanism, links: Mapping[str, Link], own: Mapping[str, Any]) -> Joint:
-    a, b, options = links[own["a"]], links[own["b"]], {"region": _region(own["region"]), "name": own["name"]}
-    if not any(isinstance(link, FlexibleLink) for link in (a, b)):
-        options["region"] = None
-    if own["kind"] == "prismatic":
-        return mechanism.prismatic(a, b, at=own["at"], axis=own["axis"], **options)
-    join = mechanism.revolute if own["kind"] == "revolute" else mechanism.weld
-    return join(a, b, at=own["at"], **options)
+    a, b = links[own["a"]], links[own["b"]]
+    region = _region(own["region"]) if any(isinstance(link, FlexibleLink) for link in (a, b)) else None
+    axis = {} if own["axis"] is None else {"axis": own["axis"]}
+    return mechanism.join(JOINT_KINDS[own["kind"]], a, b, at=place_of(own), region=region, name=own["name"], **axis)
 
 
-def _effect(own: Mapping[str, Any], joints: Mapping[str, Joint]) -> Effect:
+def place_of(own: Mapping[str, Any]) -> list[float]:
+    """The place of a joint, force or output."""
+    return [*own["at"], own["z"]] if "z" in own else own["at"]
+
+
+def _load(own: Mapping[str, Any], parts: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Arguments of a force or output."""
+    region = {"region": made(own["region"], parts)} if "region" in own else {}
+    on = parts["links"][own["on"]]
+    return {"on": on, "at": place_of(own), "direction": own["direction"], "name": own["name"], **region}
+
+
+def _effect(own: Mapping[str, Any], joints: Mapping[str, Joint], parts: Mapping[str, Mapping[str, Any]]) -> Effect:
     if own["kind"] == "gravity":
         return Gravity(tuple(own["acceleration"]))
     if own["kind"] == "temperature":
         return Temperature(own["change"])
-    return JointSpring(joints[own["joint"]], own["stiffness"], rest=own["rest"])
+    if own["kind"] == "joint spring":
+        return JointSpring(joints[own["joint"]], own["stiffness"], rest=own["rest"])
+    return made(own["data"], parts)

@@ -1,4 +1,4 @@
-"""Cancelling a computation: equilibria, derivatives and estimates ask before each factor whether they go on."""
+"""Ending a computation: equilibria, derivatives and estimates ask before each factor whether they go on."""
 
 from __future__ import annotations
 
@@ -12,6 +12,10 @@ class Cancelled(Exception):
     """Another task has come."""
 
 
+class TooLong(Exception):
+    """The time of a task is over."""
+
+
 @dataclass(frozen=True)
 class Cancellable(LinearMethod):
     """The method by size, whose solvers call ``check`` before they factor.
@@ -20,7 +24,7 @@ class Cancellable(LinearMethod):
     an iteration, by what ``check`` raises.
 
     Attributes:
-        check: raises Cancelled.
+        check: raises Cancelled or TooLong.
     """
 
     check: Callable[[], None]

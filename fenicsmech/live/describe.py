@@ -1,16 +1,28 @@
-"""From a design problem of a script to the project of a live page."""
+"""From a design problem of a script to the project of a live page.
+
+What the page edits becomes the entries that it knows; everything else is carried as it is (``carried``). Each sample of
+a target gives a curve that goes through it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import base64
+import zlib
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
-from fenicsmech.design import DesignProblem, SplineDesign, Target
+import numpy as np
+
+from fenicsmech.design import DEFAULT_REGULARISER, DesignProblem, DesignResult, SplineDesign, Target
+from fenicsmech.design import Number as NumberDesigned
 from fenicsmech.effects import Gravity, JointSpring, Temperature
+from fenicsmech.elasticity import PLANE_STRESS, MixedFormulation, Quadrature
 from fenicsmech.errors import DescriptionError
+from fenicsmech.joints import JOINT_KINDS
 from fenicsmech.laws import NeoHookean
-from fenicsmech.live.build import material_of
-from fenicsmech.live.project import FORMAT, Project, materials, read_project
+from fenicsmech.live.build import draw, material_of
+from fenicsmech.live.carried import plain
+from fenicsmech.live.project import FORMAT, LARGEST_FILE, Project, materials, read_project
 from fenicsmech.live.schema import Refused
 from fenicsmech.mechanism import (
     Configuration,
@@ -18,133 +30,264 @@ from fenicsmech.mechanism import (
     Effect,
     FlexibleLink,
     Force,
+    ForceGroup,
+    Joint,
     Line,
     Link,
     Material,
-    Outline,
+    MeshPart,
+    Output,
     Region,
     Shape,
+    StepPart,
     Strip,
     Units,
 )
+from fenicsmech.meshing import LEAST_SEGMENTS
+from fenicsmech.model import fits
+from fenicsmech.quantities import Sample
+from fenicsmech.simulation import Simulation
 
 _REMEDY = "Describe it with what the live page knows: python3 -m fenicsmech.live shows a project"
-_SPACES = {"plane-stress": "plane-stress", "plane-strain": "plane-strain", "3d": "plane-stress"}
 
 
-def project_of(problem: DesignProblem) -> Project:
-    """A design problem as a project; problems in 3D in plane stress.
+def project_of(problem: DesignProblem, result: DesignResult | None = None) -> Project:
+    """A design problem as a project; problems in 3D that plane stress can describe in plane stress.
+
+    Args:
+        problem: with its simulation.
+        result: whose shape the project has; the drawn one by default.
 
     Raises:
-        DescriptionError: a part of it is nothing that the page knows.
+        DescriptionError: a part of it has no plain data, or is more than the page shows; the result belongs to another
+            problem.
     """
-    simulation, scene = problem.simulation, problem.simulation.scene
-    mechanism, fidelity = scene.mechanism, simulation.fidelity
+    mechanism = problem.simulation.scene.mechanism
     part = f"live page of {mechanism.name!r}"
-    if scene.units != Units():
-        raise DescriptionError(part, f"its units are {scene.units}", "Describe it in mm and N")
-    designs = {own.link: own for own in problem.designs if isinstance(own, SplineDesign)}
-    for design in designs.values():
-        if design.same or design.mirrored or design.centreline or design.ends or design.ends_move:
-            raise DescriptionError(part, f"the design of {design.link.name!r} has further options", _REMEDY)
-    if len(designs) < len(problem.designs):
-        raise DescriptionError(part, "numbers of parts change as well", _REMEDY)
-    curves: dict[tuple[Force, Configuration], dict[str, Any]] = {}
-    targets = [_target(part, own, curves) for own in problem.targets]
-    data = {
-        "format": FORMAT,
-        "name": mechanism.name,
-        "links": [_link(part, link, designs) for link in mechanism.links],
-        "joints": [
-            {
-                "name": joint.name,
-                "kind": joint.kind.name,
-                "a": joint.a.name,
-                "b": joint.b.name,
-                "at": list(joint.at[:2]),
-                "axis": list(joint.axis[:2]) if joint.kind.sliding else None,
-                "region": _region(next((own for own in joint.regions if own is not None), None)),
-            }
-            for joint in mechanism.joints
-        ],
-        "motors": [{"name": own.name, "joint": own.joint.name} for own in mechanism.motors],
-        "forces": [
-            {"name": own.name, "on": own.on.name, "at": list(own.at[:2]), "direction": list(own.direction[:2])}
-            for own in mechanism.forces
-        ],
-        "effects": [_effect(part, own) for own in scene.effects],
-        "curves": list(curves.values()),
-        "targets": targets,
-        "simulation": {
-            "space": _SPACES.get(fidelity.model.name, "plane-stress"),
-            "size": float(min(fidelity.sizes.values())),
-            "order": fidelity.order,
-        },
-        "design": None,
-        "fit": True,
-    }
-    if any(own.region is not None for own in mechanism.forces):
-        raise DescriptionError(part, "a force acts on a region", _REMEDY)
     try:
-        return read_project(data)
+        project = read_project(_data(problem))
     except Refused as refused:
         raise DescriptionError(part, str(refused), _REMEDY) from None
+    except DescriptionError as error:
+        raise DescriptionError(part, error.problem, error.remedy) from None
+    if result is None:
+        return project
+    own = draw(project).along_curves(project)
+    assert own is not None, "a problem has designs"
+    placement = own.placement(result)
+    design = {"offsets": (placement.p - own.initial).tolist(), "handles": placement.theta.tolist()}
+    return {**project, "design": design}
 
 
-def _target(part: str, target: Target, curves: dict[tuple[Force, Configuration], dict[str, Any]]) -> dict[str, Any]:
-    """A target, whose curve is added if it is new, and reaches to its largest target."""
-    found = target.on_curve
-    if found is None or not found[1]:
-        raise DescriptionError(part, f"the target of the {target.name} is no point of a curve", _REMEDY)
-    force, magnitude, displacement, configuration = found
-    curve = curves.setdefault(
-        (force, configuration),
-        {
-            "name": configuration.name if len(curves) == 0 else f"{configuration.name} {len(curves) + 1}",
-            "force": force.name,
-            "largest": magnitude,
+def _data(problem: DesignProblem) -> Project:
+    """The project of a problem, not checked."""
+    simulation, scene = problem.simulation, problem.simulation.scene
+    mechanism = scene.mechanism
+    if scene.units != Units():
+        raise DescriptionError("units", f"its units are {scene.units}", "Describe it in mm and N")
+    designs = {own.link: own for own in problem.designs if isinstance(own, SplineDesign)}
+    numbers = [own for own in problem.designs if isinstance(own, NumberDesigned)]
+    curves = _Curves()
+    targets, requirements = list[dict[str, Any]](), list[dict[str, Any]]()
+    for target in problem.targets:
+        curve = None if target.sample is None else curves.through(target.sample)
+        found = target.on_curve
+        if found is not None and found[1] and found[2] and target.scale is None and curve is not None:
+            own = {"curve": curve, "force": found[1], "displacement": found[2], "weight": target.weight}
+            targets.append(own)
+        else:
+            requirements.append({"name": _words(target), "data": plain(target)})
+    if not curves.found:
+        remedy = "Give a target under a force, whose curve the page shows"
+        raise DescriptionError("targets", "no force acts in the samples of its targets", remedy)
+    more = {
+        "outputs": [_load(own) for own in mechanism.outputs],
+        "requirements": requirements,
+        "numbers": [{"name": str(own), "data": plain(own)} for own in numbers],
+    }
+    if problem.regulariser != DEFAULT_REGULARISER:
+        more["regulariser"] = plain(problem.regulariser)
+    return {
+        "format": FORMAT,
+        "name": mechanism.name,
+        "links": [_link(link, designs) for link in mechanism.links],
+        "joints": [_joint(joint) for joint in mechanism.joints],
+        "motors": [{"name": own.name, "joint": own.joint.name} for own in mechanism.motors],
+        "forces": [_load(own) for own in mechanism.forces],
+        "effects": [_effect(own) for own in scene.effects],
+        "curves": curves.found,
+        "targets": targets,
+        "simulation": _simulation(simulation),
+        "design": None,
+        "fit": True,
+        **{key: value for key, value in more.items() if value},
+    }
+
+
+class _Curves:
+    """The curves of a project, that go through the samples of targets.
+
+    Attributes:
+        found: as the project has them.
+    """
+
+    def __init__(self) -> None:
+        self.found: list[dict[str, Any]] = []
+        self._keys: list[Hashable] = []
+
+    def through(self, sample: Sample) -> int | None:
+        """The number of the curve through a sample, added if it is new; None if no force acts there."""
+        part, value = sample.part, sample.value
+        if not value or not part.ratios:
+            return None
+        configuration, held, others = sample.configuration, sample.moved is not None, dict(sample.others)
+        key = (part.ratios, configuration, held, sample.others, value > 0.0)
+        if key not in self._keys:
+            self._keys.append(key)
+            self.found.append(self._curve(part, configuration, held=held, largest=value, others=others))
+        number = self._keys.index(key)
+        own = self.found[number]
+        if abs(value) > abs(own["largest"]):
+            own["largest"] = value
+        return number
+
+    def _curve(
+        self,
+        part: Force | ForceGroup,
+        configuration: Configuration,
+        *,
+        held: bool,
+        largest: float,
+        others: Mapping[Force, float],
+    ) -> dict[str, Any]:
+        first, name = part.ratios[0][0], configuration.name[:50]
+        more: dict[str, Any] = {"held": True} if held else {}
+        if isinstance(part, ForceGroup):
+            more["ratios"] = {force.name: ratio for force, ratio in part.ratios}
+        return {
+            "name": f"{name} {len(self.found) + 1}" if name in [own["name"] for own in self.found] else name,
+            "force": first.name,
+            "largest": largest,
             "steps": 12,
-            "positions": {motor.name: value for motor, value in configuration.positions},
-            "others": {},
-        },
-    )
-    if abs(magnitude) > abs(curve["largest"]):
-        curve["largest"] = magnitude
-    number = list(curves).index((force, configuration))
-    return {"curve": number, "force": magnitude, "displacement": displacement, "weight": target.weight}
+            "positions": {motor.name: position for motor, position in configuration.positions},
+            "others": {force.name: magnitude for force, magnitude in others.items()},
+            **more,
+        }
 
 
-def _link(part: str, link: Link, designs: Mapping[FlexibleLink, SplineDesign]) -> dict[str, Any]:
+def _words(target: Target) -> str:
+    """A target in words."""
+    wanted = ", ".join(f"{value:.6g}" for value in target.wanted)
+    relation = {"equals": f"is {wanted}", "least": "as small as possible"}.get(target.relation)
+    return f"{target.name} {relation or f'{target.relation} {wanted}'}"[:400]
+
+
+def _simulation(simulation: Simulation) -> dict[str, Any]:
+    fidelity = simulation.fidelity
+    model, size = fidelity.model, float(min(fidelity.sizes.values()))
+    flat = model.dim == 3 and fits(simulation.scene, PLANE_STRESS)
+    found = {"space": PLANE_STRESS.name if flat else model.name, "size": size, "order": fidelity.order}
+    if any(own != size for own in fidelity.sizes.values()):
+        found["sizes"] = {link.name: own / size for link, own in fidelity.sizes.items()}
+    if fidelity.layers is not None and not flat:
+        found["layers"] = fidelity.layers
+    if fidelity.segments != LEAST_SEGMENTS:
+        found["segments"] = fidelity.segments
+    if fidelity.quadrature != Quadrature.for_order(fidelity.order, model.dim):
+        found["quadrature"] = plain(fidelity.quadrature)
+    if fidelity.formulation != MixedFormulation():
+        found["formulation"] = plain(fidelity.formulation)
+    return found
+
+
+def _link(link: Link, designs: Mapping[FlexibleLink, SplineDesign]) -> dict[str, Any]:
     if not isinstance(link, FlexibleLink):
         return {"kind": "rigid", "name": link.name, "fixed": link.fixed}
-    design = designs.get(link)
     return {
         "kind": "flexible",
         "name": link.name,
-        "shape": _shape(part, link.name, link.shape),
-        "material": _material(part, link.material),
-        "design": design
-        and {"segments": design.segments, "thickness": None if design.thickness is None else list(design.thickness)},
+        "shape": _shape(link.name, link.shape),
+        "material": _material(link.material),
+        "design": _design(designs[link]) if link in designs else None,
     }
 
 
-def _shape(part: str, name: str, shape: Shape) -> dict[str, Any]:
+def _design(design: SplineDesign) -> dict[str, Any]:
+    more = {
+        "bend": None if design.bend == SplineDesign.bend else design.bend,
+        "centreline": design.centreline and np.array(design.centreline, dtype=float).tolist(),
+        "ends": design.ends and np.array(design.ends, dtype=float).tolist(),
+        "ends_move": design.ends_move,
+        **{name: [link.name for link in getattr(design, name)] for name in ("same", "mirrored")},
+    }
+    thickness = None if design.thickness is None else list(design.thickness)
+    return {"segments": design.segments, "thickness": thickness, **{key: own for key, own in more.items() if own}}
+
+
+def _joint(joint: Joint) -> dict[str, Any]:
+    if JOINT_KINDS.get(joint.kind.name) is not joint.kind:
+        remedy = f"Use one of the kinds {', '.join(JOINT_KINDS)}"
+        raise DescriptionError(f"{joint.name!r}", f"{joint.name!r} is of a kind of its own, {joint.kind.name}", remedy)
+    axis = None if joint.axis == (0.0, 0.0, 1.0) else list(joint.axis if joint.axis[2] else joint.axis[:2])
+    return {
+        "name": joint.name,
+        "kind": joint.kind.name,
+        "a": joint.a.name,
+        "b": joint.b.name,
+        "at": list(joint.at[:2]),
+        "axis": axis,
+        "region": _region(next((own for own in joint.regions if own is not None), None)),
+        **_height(joint.at),
+    }
+
+
+def _load(load: Force | Output) -> dict[str, Any]:
+    direction = list(load.direction if any(load.direction[2:]) else load.direction[:2])
+    own = {"name": load.name, "on": load.on.name, "at": list(load.at[:2]), "direction": direction, **_height(load.at)}
+    return own if load.region is None else {**own, "region": plain(load.region)}
+
+
+def _height(at: Sequence[float]) -> dict[str, float]:
+    return {"z": at[2]} if len(at) == 3 else {}
+
+
+def _shape(name: str, shape: Shape) -> dict[str, Any]:
     if isinstance(shape, Strip):
         line = [list(point) for point in shape.centreline]
         return {"kind": "strip", "line": line, "thickness": shape.thickness, "depth": shape.depth}
-    if isinstance(shape, Outline) and all(isinstance(own, Line) for own in shape.segments):
+    if isinstance(shape, StepPart | MeshPart):
+        own = {"name": shape.path.name, "content": _content(name, shape), "depth": shape.depth}
+        if isinstance(shape, MeshPart):
+            return {"kind": "mesh", **own}
+        return {"kind": "step", **own, "section": shape.section}
+    if all(isinstance(own, Line) for own in shape.segments) and shape.segments[-1].end == shape.start:
         corners = [list(shape.start), *(list(own.end) for own in shape.segments[:-1])]
         return {"kind": "polygon", "corners": corners, "depth": shape.depth}
-    raise DescriptionError(part, f"{name!r} is neither a strip nor a polygon", _REMEDY)
+    return {"kind": "outline", "data": plain(shape), "depth": shape.depth}
 
 
-def _material(part: str, material: Material) -> Any:
+def _content(name: str, shape: StepPart | MeshPart) -> str:
+    """The file of a link, compressed, in base64."""
+    try:
+        found = base64.b64encode(zlib.compress(shape.path.read_bytes(), 9)).decode()
+    except OSError as error:
+        problem = f"the file of {name!r} cannot be read: {error.strerror}"
+        raise DescriptionError(name, problem, "Give its path") from None
+    if len(found) > LARGEST_FILE:
+        size = f"{len(found)} characters when compressed, not at most {LARGEST_FILE}"
+        raise DescriptionError(name, f"the file of {name!r} has {size}", "Give a file with fewer faces or elements")
+    return found
+
+
+def _material(material: Material) -> Any:
     for name in materials():
         if material_of(name) == material:
             return name
-    if not isinstance(material.law, NeoHookean):
-        raise DescriptionError(part, f"{material.name!r} has the law {type(material.law).__name__}", _REMEDY)
-    return {"name": material.name, "E": material.law.E, "nu": material.law.nu, "density": material.density}
+    law = material.law
+    if isinstance(law, NeoHookean):
+        if Material(material.name, law.E, law.nu, density=material.density) == material:
+            return {"name": material.name, "E": law.E, "nu": law.nu, "density": material.density}
+    return {"name": material.name, "data": plain(material)}
 
 
 def _region(region: Region | None) -> dict[str, Any] | None:
@@ -155,11 +298,11 @@ def _region(region: Region | None) -> dict[str, Any] | None:
     return {"kind": "rectangle", "length": region.length, "width": region.width, "angle": region.angle}
 
 
-def _effect(part: str, effect: Effect) -> dict[str, Any]:
-    if isinstance(effect, Gravity) and not effect.masses:
+def _effect(effect: Effect) -> dict[str, Any]:
+    if isinstance(effect, Gravity) and not effect.masses and not any(effect.acceleration[2:]):
         return {"kind": "gravity", "acceleration": list(effect.acceleration[:2])}
     if isinstance(effect, JointSpring):
         return {"kind": "joint spring", "joint": effect.joint.name, "stiffness": effect.stiffness, "rest": effect.rest}
     if isinstance(effect, Temperature) and effect.links is None and isinstance(effect.change, float):
         return {"kind": "temperature", "change": effect.change}
-    raise DescriptionError(part, f"{effect.explain()} is no effect that it knows", _REMEDY)
+    return {"kind": "carried", "text": effect.explain()[:300], "data": plain(effect)}

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from fenicsmech.design import rest_meshes
+from fenicsmech.design import SplineDesign, rest_meshes
 from fenicsmech.errors import DescriptionError, FenicsmechError
 from fenicsmech.export import smooth_outline
 from fenicsmech.files import atomic_write
@@ -31,7 +31,7 @@ from fenicsmech.simulation import Curve, MechanismPlotter, Simulation, gather
 
 
 def export(project: Project, what: str, folder: Path) -> list[Path]:
-    """Writes the files of a sort into a folder.
+    """Writes the files of a sort into a folder: pictures and animations of each curve, the links of all.
 
     Raises:
         FenicsmechError: they cannot be made.
@@ -39,13 +39,17 @@ def export(project: Project, what: str, folder: Path) -> list[Path]:
     drawing = draw(project)
     if what in ("step", "stl", "dxf"):
         return _links(project, drawing, what, folder)
-    request = drawing.request(project, 0, forces_of(project, 0))
-    curve = _designed(project, drawing).compute(request)
-    if what == "animation":
-        return [_animation(drawing, curve, folder)]
-    curve.plot(folder / "curve.png")
-    curve.picture(folder / "mechanism.png")
-    return [folder / "curve.png", folder / "mechanism.png"]
+    simulation, paths = _designed(project, drawing), list[Path]()
+    for number in range(len(project["curves"])):
+        curve = simulation.compute(drawing.request(project, number, forces_of(project, number)))
+        tail = f"-{number + 1}" if len(project["curves"]) > 1 else ""
+        if what == "animation":
+            paths.append(_animation(drawing, curve, folder / f"animation{tail}.gif"))
+            continue
+        curve.plot(folder / f"curve{tail}.png")
+        curve.picture(folder / f"mechanism{tail}.png")
+        paths += [folder / f"curve{tail}.png", folder / f"mechanism{tail}.png"]
+    return paths
 
 
 def _designed(project: Project, drawing: Drawing) -> Simulation:
@@ -61,7 +65,8 @@ def _links(project: Project, drawing: Drawing, what: str, folder: Path) -> list[
     problem = drawing.along_curves(project)
     if problem is None:
         raise DescriptionError("export", "no link changes its shape", "Let one follow the targets")
-    at, links = placement(project, problem) or problem.initial, [own.link for own in drawing.designs(project)]
+    shapes = [own for own in drawing.designs(project) if isinstance(own, SplineDesign)]
+    at, links = placement(project, problem) or problem.initial, [link for own in shapes for link in own.links]
     if what != "dxf":
         problem.export(folder, at)
         return sorted(folder.glob(f"*.{what}"))
@@ -100,7 +105,7 @@ def _sampled(curve: Any) -> np.ndarray:
     return curve(np.concatenate([np.linspace(a, b, 9)[:-1] for a, b in zip(knots, knots[1:], strict=False)]))
 
 
-def _animation(drawing: Drawing, curve: Curve, folder: Path) -> Path:
+def _animation(drawing: Drawing, curve: Curve, path: Path) -> Path:
     """The frames of a curve, there and back, as a GIF."""
     from PIL import Image  # matplotlib needs it too
 
@@ -111,12 +116,12 @@ def _animation(drawing: Drawing, curve: Curve, folder: Path) -> Path:
         assert snapshot is not None, "there is one process"
         shapes.append(plotter.shape(snapshot))
     for k, shape in enumerate(shapes):
-        path = folder / f"frame-{k}.png"
+        single = path.with_name(f"frame-{k}.png")
         title = f"{curve.frames[k].force:.3g} N, {curve.frames[k].displacement:.3g} mm"
-        draw_configurations(path, [Panel(shapes[0], (shapes[-1], shape), title=title)])
-        with Image.open(path) as image:
+        draw_configurations(single, [Panel(shapes[0], (shapes[-1], shape), title=title)])
+        with Image.open(single) as image:
             pictures.append(image.convert("P"))
-    path, there = folder / "animation.gif", [*pictures, *pictures[-2:0:-1]]
+    there = [*pictures, *pictures[-2:0:-1]]
     there[0].save(path, save_all=True, append_images=there[1:], duration=120, loop=0)
     return path
 

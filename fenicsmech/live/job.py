@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
 from typing import Any
+
+from fenicsmech.live.told import too_long
 
 _LONGEST = 2**27  # bytes of an event
 
@@ -28,13 +31,16 @@ class Job:
     Args:
         command: that reads a task as JSON from standard input, and writes events to standard output, a line each.
         receive: called with each event.
+        longest: seconds that a task may take.
 
     Attributes:
         last: the last event, for pages that are opened later; None before the first, and when it is forgotten.
     """
 
-    def __init__(self, command: tuple[str, ...], receive: Callable[[Mapping[str, Any]], None]) -> None:
-        self._command, self._receive = command, receive
+    def __init__(
+        self, command: tuple[str, ...], receive: Callable[[Mapping[str, Any]], None], longest: float = math.inf
+    ) -> None:
+        self._command, self._receive, self._longest = command, receive, longest
         self._work: asyncio.Task[None] | None = None
         self._changing = asyncio.Lock()  # of two that start at once, the later one lasts
         self.last: Mapping[str, Any] | None = None
@@ -73,7 +79,11 @@ class Job:
 
     async def _run(self, task: Mapping[str, Any]) -> None:
         try:
-            problem = await self._problem(task)
+            async with asyncio.timeout(None if math.isinf(self._longest) else self._longest):
+                problem = await self._problem(task)
+        except TimeoutError:
+            self.tell({"event": "solid", "state": "failed", **too_long(self._longest)})
+            return
         except Exception as error:  # nobody waits for this: it would end silently
             problem = f"{type(error).__name__}: {error}"
         if problem is not None:

@@ -33,7 +33,8 @@ last edit knows nothing of it. ``event`` is one of
                         rigid [[[x, y]] a rigid link]
     and the results of the solver below, of the present task alone
 
-Server to solver, a line each: {task: number, kind: solve | push, project, fit, curve, force}.
+Server to solver, a line each: {task: number, kind: solve | push, project, fit, curve, force, longest
+(seconds that it may take)}.
 
 Solver to server, a line each, with the number of their task:
 
@@ -44,13 +45,16 @@ Solver to server, a line each, with the number of their task:
                   force, displacement, stable, snapped, stress (largest von Mises),
                   nodes [[[x, y]] a flexible link], von_mises [[one a node] a flexible link],
                   rigid [[[x, y]] a rigid link: its joints, forces and outputs], pins [[x, y]]
-    errors    curve, errors: estimated discretisation errors of the displacements of its points, to be added; peak of
-                  the stress at its end, outside of singular places: {value, error, link}, null if there is none
-    fitted    design, misfits, reason, converged, iterations
+    errors    curve, errors: estimated discretisation errors of the displacements of its points, or of the forces where
+                  displacements are held, to be added; peak of the stress at its end, outside of singular places:
+                  {value, error, link}, null if there is none
+    fitted    design, misfits, iterations, missed: {problem, remedy} of targets out of reach or an early end, null if
+              all is well
     linear    the linear preview at a design, Q(p + s) ≈ Q + e + J s, R ≈ ∂R/∂p s + ½ sᵀ ∂²R/∂p² s:
                   design, lengths (typical change of each parameter), curves: [{forces, values, errors, jacobian}],
                   gradient, curvature, active (bounds that hold it back), whole (not cut where a curve snaps),
                   links: [{name, controls [[[x, y, δ], tangent]], entries (parameter of each, −1 none), thickness}]
+    required  values of the project's requirements, with their estimated errors: [[component]]; empty if failed
     pushed    curve, point
     done      seconds
     cancelled

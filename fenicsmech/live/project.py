@@ -2,7 +2,8 @@
 
 A project is a mapping of plain data that ``PROJECT`` describes; ``read_project`` checks what a schema cannot: that
 parts refer to each other. Edits return another project and never change the one they are given. Lengths are in mm,
-forces in N, as the materials' cards have them.
+forces in N, as the materials' cards have them. What the page does not edit stands in entries that need not be there:
+further effects, laws and shapes, requirements on any quantity, numbers that change with the shapes (``carried``).
 """
 
 from __future__ import annotations
@@ -16,9 +17,16 @@ from math import hypot
 from pathlib import Path
 from typing import Any
 
+from fenicsmech.design import Number as NumberDesigned
+from fenicsmech.design import Target
+from fenicsmech.elasticity import DisplacementFormulation, MixedFormulation, Quadrature
 from fenicsmech.errors import DescriptionError
+from fenicsmech.joints import JOINT_KINDS
+from fenicsmech.live.carried import EFFECTS, REGIONS, REGULARISERS, Carried, references
 from fenicsmech.live.schema import (
     FLAG,
+    LONGEST_NAME,
+    ByEntry,
     ByKind,
     Choice,
     Many,
@@ -31,7 +39,8 @@ from fenicsmech.live.schema import (
     Text,
     TextOr,
 )
-from fenicsmech.mechanism import material_card, material_names
+from fenicsmech.mechanism import Material, Outline, material_card, material_names
+from fenicsmech.model import SPACES
 
 FORMAT = "fenicsmech live project 1"
 EXAMPLES = Path(__file__).parent / "examples"
@@ -40,15 +49,18 @@ Project = dict[str, Any]
 
 
 MOST_LINKS = 24
-MOST_CURVES = 4
-MOST_TARGETS = 12
+MOST_CURVES = 12
+MOST_TARGETS = 40
+MOST_ADDED = {"curves": 4, "targets": 12}  # up to which the page adds; scripts bring more
 MOST_ELEMENTS = 10_000  # triangles of a mesh, which the page draws in each of up to 160 frames
+LARGEST_FILE = 600_000  # characters of the content of a link's file
 MOST_PARAMETERS = MOST_LINKS * 100 * 2  # of a design: two coordinates of each handle
 
 _COORDINATE = Number(-1e5, 1e5)
 _LENGTH = Number(1e-3, 1e5)
 _POINT = Many(_COORDINATE, 2, 2)
-_NAME = Text(60)
+_VECTOR = Many(_COORDINATE, 2, 3)
+_NAME = Text(LONGEST_NAME)
 _CURVE = Number(0, MOST_CURVES - 1, whole=True)
 
 # the authors' materials beside those of cards
@@ -71,14 +83,28 @@ class _MaterialName(Schema):
 
 _MATERIAL = TextOr(
     _MaterialName(),
-    Record(
-        {"name": _NAME, "E": Number(1e-6, 1e7), "nu": Number(-0.99, 0.4999), "density": Optional(Number(1e-15, 1e-3))}
+    ByEntry(
+        {
+            "E": Record(
+                {
+                    "name": _NAME,
+                    "E": Number(1e-6, 1e7),
+                    "nu": Number(-0.99, 0.4999),
+                    "density": Optional(Number(1e-15, 1e-3)),
+                }
+            ),
+            "data": Record({"name": _NAME, "data": Carried((Material,))}),
+        }
     ),
 )
 _SHAPE = ByKind(
     {
-        "strip": Record({"line": Many(_POINT, 2, 20), "thickness": _LENGTH, "depth": _LENGTH}),
-        "polygon": Record({"corners": Many(_POINT, 3, 100), "depth": _LENGTH}),
+        "strip": Record({"line": Many(_POINT, 2, 100), "thickness": _LENGTH, "depth": _LENGTH}),
+        "polygon": Record({"corners": Many(_POINT, 3, 1000), "depth": _LENGTH}),
+        "outline": Record({"data": Carried((Outline,)), "depth": _LENGTH}),
+        # a file with its content, compressed, in base64
+        "step": Record({"name": _NAME, "content": Text(LARGEST_FILE), "depth": _LENGTH, "section": _COORDINATE}),
+        "mesh": Record({"name": _NAME, "content": Text(LARGEST_FILE), "depth": _LENGTH}),
     }
 )
 _LINK = ByKind(
@@ -90,7 +116,19 @@ _LINK = ByKind(
                 "shape": _SHAPE,
                 "material": _MATERIAL,
                 # the shape changes with its targets, within bounds of its thickness in mm; None: by a factor of three
-                "design": Optional(Record({"segments": Number(1, 8, whole=True), "thickness": Optional(_POINT)})),
+                "design": Optional(
+                    Record(
+                        {"segments": Number(1, 20, whole=True), "thickness": Optional(_POINT)},
+                        {
+                            "bend": Number(1e-6, 1e3),
+                            "centreline": Many(_POINT, 2, 200),
+                            "ends": Many(_POINT, 2, 2),
+                            "ends_move": FLAG,
+                            "same": Many(_NAME, 1, MOST_LINKS),
+                            "mirrored": Many(_NAME, 1, MOST_LINKS),
+                        },
+                    )
+                ),
             }
         ),
     }
@@ -104,19 +142,24 @@ _REGION = ByKind(
 _JOINT = Record(
     {
         "name": _NAME,
-        "kind": Choice(("revolute", "weld", "prismatic")),
+        "kind": Choice(tuple(JOINT_KINDS)),
         "a": _NAME,
         "b": _NAME,
         "at": _POINT,
-        "axis": Optional(_POINT),  # of sliders
+        "axis": Optional(_VECTOR),  # None: along z
         "region": Optional(_REGION),  # of flexible links
-    }
+    },
+    {"z": _COORDINATE},
+)
+_LOAD = Record(
+    {"name": _NAME, "on": _NAME, "at": _POINT, "direction": _VECTOR}, {"z": _COORDINATE, "region": Carried(REGIONS)}
 )
 _EFFECT = ByKind(
     {
         "gravity": Record({"acceleration": _POINT}),
         "temperature": Record({"change": Number(-300, 300)}),
         "joint spring": Record({"joint": _NAME, "stiffness": Number(1e-9, 1e9), "rest": _COORDINATE}),
+        "carried": Record({"text": Text(300), "data": Carried(EFFECTS)}),
     }
 )
 
@@ -125,10 +168,10 @@ PROJECT = Record(
         "format": Choice((FORMAT,)),
         "name": _NAME,
         "links": Many(_LINK, 2, MOST_LINKS),
-        "joints": Many(_JOINT, 1, 40),
-        "motors": Many(Record({"name": _NAME, "joint": _NAME}), 0, 10),
-        "forces": Many(Record({"name": _NAME, "on": _NAME, "at": _POINT, "direction": _POINT}), 1, 10),
-        "effects": Many(_EFFECT, 0, 10),
+        "joints": Many(_JOINT, 1, 80),
+        "motors": Many(Record({"name": _NAME, "joint": _NAME}), 0, 20),
+        "forces": Many(_LOAD, 1, 20),
+        "effects": Many(_EFFECT, 0, 20),
         "curves": Many(
             Record(
                 {
@@ -138,7 +181,11 @@ PROJECT = Record(
                     "steps": Number(2, 40, whole=True),
                     "positions": Mapped(Number(-100, 100)),  # of motors, rad or mm
                     "others": Mapped(Number(-1e6, 1e6)),  # constant forces, N
-                }
+                },
+                {
+                    "held": FLAG,  # displacements are prescribed, up to the largest in mm
+                    "ratios": Mapped(Number(-1e6, 1e6)),  # of forces that grow together, its force's among them
+                },
             ),
             1,
             MOST_CURVES,
@@ -151,7 +198,14 @@ PROJECT = Record(
             MOST_TARGETS,
         ),
         "simulation": Record(
-            {"space": Choice(("plane-stress", "plane-strain")), "size": _LENGTH, "order": Number(1, 3, whole=True)}
+            {"space": Choice(tuple(SPACES)), "size": _LENGTH, "order": Number(1, 3, whole=True)},
+            {
+                "sizes": Mapped(Number(1e-3, 1e3)),  # of elements of links, over the size
+                "layers": Number(1, 100, whole=True),
+                "segments": Number(3, 200, whole=True),
+                "quadrature": Carried((Quadrature,)),
+                "formulation": Carried((MixedFormulation, DisplacementFormulation)),
+            },
         ),
         # parameters p less those drawn, and handle positions θ; None: as drawn
         "design": Optional(
@@ -163,10 +217,17 @@ PROJECT = Record(
             )
         ),
         "fit": FLAG,  # whether the design follows its targets
-    }
+    },
+    {
+        "outputs": Many(_LOAD, 0, 40),
+        # what is wanted of other quantities than those of curves
+        "requirements": Many(Record({"name": Text(400), "data": Carried((Target,))}), 0, MOST_TARGETS),
+        "numbers": Many(Record({"name": Text(400), "data": Carried((NumberDesigned,))}), 0, 40),
+        "regulariser": Carried(REGULARISERS),
+    },
 )
 
-_DRAWING = ("links", "joints", "motors", "forces", "effects", "simulation")
+_DRAWING = ("links", "joints", "motors", "forces", "effects", "simulation", "outputs", "numbers", "regulariser")
 
 
 def read_project(data: Any) -> Project:
@@ -179,6 +240,7 @@ def read_project(data: Any) -> Project:
     project = deepcopy(data)
     links, joints = _named(project, "links"), _named(project, "joints")
     motors, forces = _named(project, "motors"), _named(project, "forces")
+    outputs = _named(project, "outputs")
     for k, joint in enumerate(project["joints"]):
         for end in ("a", "b"):
             _known(joint[end], links, f"joints[{k}].{end}")
@@ -188,16 +250,29 @@ def read_project(data: Any) -> Project:
             raise Refused(f"joints[{k}]", "it has no region on its flexible link")
         if joint["kind"] == "prismatic" and not any(joint["axis"] or ()):
             raise Refused(f"joints[{k}]", "a slider without an axis")
+        if joint["axis"] is not None and not any(joint["axis"]):
+            raise Refused(f"joints[{k}].axis", "it has no length")
     for k, motor in enumerate(project["motors"]):
         _known(motor["joint"], joints, f"motors[{k}].joint")
-    for k, force in enumerate(project["forces"]):
-        _known(force["on"], links, f"forces[{k}].on")
-        if not any(force["direction"]):
-            raise Refused(f"forces[{k}].direction", "it has no length")
+    for parts in ("forces", "outputs"):
+        for k, load in enumerate(project.get(parts, ())):
+            _known(load["on"], links, f"{parts}[{k}].on")
+            if not any(load["direction"]):
+                raise Refused(f"{parts}[{k}].direction", "it has no length")
     for k, effect in enumerate(project["effects"]):
         if effect["kind"] == "joint spring":
             _known(effect["joint"], joints, f"effects[{k}].joint")
     _check_size(project)
+    sorts = {"links": links, "joints": joints, "motors": motors, "forces": forces, "outputs": outputs}
+    for sort, name in references({key: own for key, own in project.items() if key != "design"}):
+        _known(name, sorts[sort], "")
+    for k, link in enumerate(project["links"]):
+        design = (link["kind"] == "flexible" and link["design"]) or {}
+        for other in (*design.get("same", ()), *design.get("mirrored", ())):
+            if links.get(other, {"kind": "none"})["kind"] != "flexible":
+                raise Refused(f"links[{k}].design", f"there is no flexible link {other!r}")
+    for name in project["simulation"].get("sizes", ()):
+        _known(name, links, "simulation.sizes")
     _named(project, "curves")
     for k, curve in enumerate(project["curves"]):
         _known(curve["force"], forces, f"curves[{k}].force")
@@ -205,12 +280,15 @@ def read_project(data: Any) -> Project:
             raise Refused(f"curves[{k}].largest", "it is zero")
         for own in curve["positions"]:
             _known(own, motors, f"curves[{k}].positions")
-        for own in curve["others"]:
+        for own in (*curve["others"], *curve.get("ratios", ())):
             _known(own, forces, f"curves[{k}].others")
     for k, target in enumerate(project["targets"]):
         if target["curve"] >= len(project["curves"]):
             raise Refused(f"targets[{k}].curve", f"there is no curve {target['curve']}")
-        if not target["force"] * project["curves"][target["curve"]]["largest"] > 0.0:
+        curve = project["curves"][target["curve"]]
+        if "ratios" in curve or curve.get("held"):
+            raise Refused(f"targets[{k}].curve", f"targets on {curve['name']!r} are given in the script")
+        if not target["force"] * curve["largest"] > 0.0:
             raise Refused(f"targets[{k}].force", "it has not the sign of its curve's force")
         if not target["displacement"]:
             raise Refused(f"targets[{k}].displacement", "it is zero, to which no error is relative")
@@ -223,7 +301,7 @@ def _check_size(project: Project) -> None:
         project["simulation"]["size"],
         [own["shape"] for own in project["links"] if own["kind"] == "flexible"],
     )
-    count = sum(_area(shape, size) for shape in shapes) / (0.43 * size**2)
+    count = sum(_area(shape, size) for shape in shapes if "content" not in shape) / (0.43 * size**2)
     if count > MOST_ELEMENTS:
         raise Refused("simulation.size", f"some {count:.2g} elements of {size:g} mm, not at most {MOST_ELEMENTS}")
 
@@ -233,15 +311,31 @@ def _area(shape: Mapping[str, Any], size: float) -> float:
     if shape["kind"] == "strip":
         length = sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(shape["line"]))
         return length * max(shape["thickness"], size)
-    corners = shape["corners"]
+    corners = shape["corners"] if shape["kind"] == "polygon" else _outline_points(shape["data"])
     ahead = [*zip(corners, [*corners[1:], corners[0]], strict=True)]
     rim = sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in ahead)
     return max(0.5 * abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in ahead)), 0.5 * rim * size)
 
 
+def _outline_points(data: Mapping[str, Any]) -> list[Sequence[float]]:
+    """Points of an outline in their order.
+
+    Raises:
+        Refused: it is none.
+    """
+    places = [data["start"]]
+    for segment in data["segments"] if isinstance(data["segments"], list) else ():
+        if not isinstance(segment, dict) or segment.get("is") not in ("Line", "Arc"):
+            raise Refused("outline", "a segment that is neither a line nor an arc")
+        places += [segment[key] for key in ("via", "end") if key in segment]
+    for place in places:
+        _POINT.check(place, "outline")
+    return places
+
+
 def _named(project: Project, parts: str) -> Mapping[str, Any]:
     found: dict[str, Any] = {}
-    for k, own in enumerate(project[parts]):
+    for k, own in enumerate(project.get(parts, ())):
         if own["name"] in found:
             raise Refused(f"{parts}[{k}].name", f"the name {own['name']!r} is taken")
         found[own["name"]] = own
@@ -290,11 +384,19 @@ def _step(at: Any, step: str | int, place: str) -> Any:
 
 def drawing(project: Project) -> str:
     """What a mesh depends on, as a text to compare."""
-    return json.dumps([project[key] for key in _DRAWING], sort_keys=True)
+    return json.dumps([project.get(key) for key in _DRAWING], sort_keys=True)
+
+
+def wants(project: Project) -> bool:
+    """Whether something is wanted of its design."""
+    return bool(project["targets"] or project.get("requirements"))
 
 
 def forces_of(project: Project, curve: int, *, coarse: bool = False) -> list[float]:
-    """The forces of a curve's frames, from zero, those of its targets among them; a third of them if ``coarse``."""
+    """The forces of a curve's frames, from zero, those of its targets among them; a third of them if ``coarse``.
+
+    Displacements where these are prescribed.
+    """
     own = project["curves"][curve]
     steps = -(-own["steps"] // 3) if coarse else own["steps"]
     even = [own["largest"] * k / steps for k in range(steps + 1)]

@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+LONGEST_NAME = 160
+"""Characters of a part's name: joints are named by kind, links and place where a script gives no name."""
+
 
 class Refused(Exception):
     """Data that do not fit their schema.
@@ -141,6 +144,19 @@ class ByKind(Schema):
 
 
 @dataclass(frozen=True)
+class ByEntry(Schema):
+    """Records of several kinds, told apart by an entry that each has alone; the first one where there is none."""
+
+    kinds: Mapping[str, Record]
+
+    def check(self, value, place=""):
+        if not isinstance(value, dict):
+            raise Refused(place, "not a record")
+        own = next((kind for entry, kind in self.kinds.items() if entry in value), next(iter(self.kinds.values())))
+        own.check(value, place)
+
+
+@dataclass(frozen=True)
 class TextOr(Schema):
     """A text of one schema, or something else of another."""
 
@@ -162,7 +178,7 @@ class Mapped(Schema):
         if not isinstance(value, dict) or len(value) > self.most:
             raise Refused(place, f"not a mapping of at most {self.most}")
         for name, own in value.items():
-            Text().check(name, place)
+            Text(LONGEST_NAME).check(name, place)
             self.of.check(own, f"{place}.{name}".lstrip("."))
 
 
@@ -170,7 +186,7 @@ class Mapped(Schema):
 class Anything(Schema):
     """Plain data of limited depth and size, whose meaning another schema checks later."""
 
-    depth: int = 12
+    depth: int = 18
     most: int = 20000
 
     def check(self, value, place=""):

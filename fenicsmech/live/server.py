@@ -26,11 +26,12 @@ from typing import TYPE_CHECKING, Any
 from fenicsmech.errors import DescriptionError
 from fenicsmech.live.job import Job, events
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
-from fenicsmech.live.project import MOST_CURVES, MOST_TARGETS, Project, example_names, materials
+from fenicsmech.live.project import MOST_ADDED, Project, example_names, materials
 from fenicsmech.live.schema import Refused
 from fenicsmech.live.script import script
 from fenicsmech.live.session import Session
 from fenicsmech.live.stored import StoredResults, user_cache
+from fenicsmech.live.told import too_long
 from fenicsmech.log import logger
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 # results that a page which is opened later needs
-_KEPT = ("mesh", "curve", "errors", "linear", "fitted", "iterate", "failed")
+_KEPT = ("mesh", "curve", "errors", "linear", "fitted", "iterate", "required", "failed")
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,9 @@ class ServerOptions:
         within: seconds.
         patience: seconds after which a solver that does not leave its task for the next one is started again; compiling
             new forms, which nothing ends, takes up to a minute.
+        longest_solve: seconds that the solver may take for a task, with the optimisation; then it ends at its next
+            factor, tells so and keeps what it has found. One that does not end within ``patience`` is started again.
+        longest_solid: seconds that a solve in space may take.
         longest_export: seconds that the files of an export may take.
         door: seconds for which the address that opens the browser works.
         stored: folder of first results for the next start; None: none are stored.
@@ -90,6 +94,8 @@ class ServerOptions:
     restarts: int = 3
     within: float = 30.0
     patience: float = 120.0
+    longest_solve: float = 600.0
+    longest_solid: float = 3600.0
     longest_export: float = 300.0
     door: float = 30.0
     stored: Path | None = field(default_factory=user_cache)
@@ -115,7 +121,7 @@ class Server:
         self._pages: set[Outbox] = set()
         self._doors: dict[str, float] = {}  # codes, and when they end
         self._solver = SolverProcess(self._from_solver, self._options)
-        self._solid = Job(self._options.solid, self._tell)
+        self._solid = Job(self._options.solid, self._tell, self._options.longest_solid)
         self._number, self._pushed = 1, False
         self._kept: dict[tuple[str, int | None], str] = {}
         self._stored = StoredResults(self._options.stored)
@@ -297,7 +303,7 @@ class Server:
     async def _ask(self, task: Mapping[str, Any]) -> None:
         self._pushed = task["kind"] == "push"
         self._say("busy")
-        await self._solver.ask({**task, "task": self._number})
+        await self._solver.ask({**task, "task": self._number, "longest": self._options.longest_solve})
 
     def _from_solver(self, event: dict[str, Any]) -> None:
         if event["event"] in ("ready", "restarted", "lost"):
@@ -336,7 +342,9 @@ class Server:
                 "positions": own["positions"],
                 "others": own["others"],
                 "points": [
-                    [point["displacement"] + error, point["force"]]
+                    [point["displacement"], point["force"] + error]
+                    if own.get("held")
+                    else [point["displacement"] + error, point["force"]]
                     for point, error in zip(self._drawn["points"], event["errors"], strict=True)
                 ],
             }
@@ -365,7 +373,7 @@ class Server:
             "opened": self.session.opened,
             "examples": example_names(),
             "materials": materials(),
-            "most": {"curves": MOST_CURVES, "targets": MOST_TARGETS},
+            "most": MOST_ADDED,
         }
 
     def _first_event(self) -> dict[str, Any]:
@@ -442,6 +450,7 @@ class SolverProcess:
         self._given: tuple[asyncio.subprocess.Process, int] | None = None  # the last task, and who has it
         self._begun = 0  # the last task that was heard of
         self._waiting: asyncio.TimerHandle | None = None  # since a task was given that has not begun
+        self._working: asyncio.TimerHandle | None = None  # since a task has begun
         self._ends: deque[float] = deque(maxlen=options.restarts)
         self._starting, self._stopped = asyncio.Lock(), False
 
@@ -490,6 +499,7 @@ class SolverProcess:
             process, self._process = self._process, None
         if self._reader is not None:
             self._reader.cancel()
+        self._rest()
         if self._waiting is not None:
             self._waiting.cancel()
         if process is not None and process.returncode is None:
@@ -504,6 +514,22 @@ class SolverProcess:
             with suppress(ProcessLookupError):
                 self._process.kill()
 
+    def _rest(self) -> None:
+        """Ends the time of the task that has begun last."""
+        if self._working is not None:
+            self._working.cancel()
+            self._working = None
+
+    def _overdue(self, task: int) -> None:
+        """Ends a process that does not end a task by itself; the next one is done by another."""
+        if self._last is None or self._last["task"] != task or self._process is None:
+            return
+        _log.warning("the solver process does not end its task and is started again")
+        self._last = None
+        with suppress(ProcessLookupError):
+            self._process.kill()
+        self._receive({"event": "failed", "task": task, **too_long(self._options.longest_solve)})
+
     def _wait(self) -> None:
         self._waiting = asyncio.get_running_loop().call_later(self._options.patience, self._urge)
 
@@ -512,6 +538,9 @@ class SolverProcess:
         if task <= self._begun:
             return
         self._begun = task
+        self._rest()
+        longest = self._options.longest_solve + self._options.patience
+        self._working = asyncio.get_running_loop().call_later(longest, self._overdue, task)
         if self._waiting is not None:
             self._waiting.cancel()
             self._waiting = None
@@ -531,6 +560,8 @@ class SolverProcess:
         try:
             async for event in events(process):
                 self._heard(event.get("task", 0))
+                if event["event"] in ("done", "cancelled", "failed") and event["task"] == self._begun:
+                    self._rest()
                 self._receive(event)
         except Exception:  # nobody waits for this: it would end silently
             _log.exception("the solver process says what nobody understands")

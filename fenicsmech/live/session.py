@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fenicsmech.live.project import Project, edited, example, example_names, read_project
+from fenicsmech.live.project import Project, edited, example, example_names, read_project, wants
 from fenicsmech.live.schema import Refused
 
 _STEPS = 200  # of undo; a project has a few thousand bytes
@@ -160,7 +160,7 @@ class Session:
         return self._asked(self._solve(fit=project["fit"] and project["design"] is None))
 
     def _solve(self, *, fit: bool) -> Mapping[str, Any]:
-        return {"kind": "solve", "project": self.project, "fit": bool(fit and self.project["targets"])}
+        return {"kind": "solve", "project": self.project, "fit": bool(fit and wants(self.project))}
 
     def _asked(self, task: Mapping[str, Any], *, changed: bool = True) -> Answer:
         self.task, self.solved, self._stopped = task, False, False

@@ -18,6 +18,7 @@ import numpy as np
 from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
 from fenicsmech.live.build import draw, placement
 from fenicsmech.live.project import Project, forces_of
+from fenicsmech.live.told import remarks, told
 from fenicsmech.simulation import Frame, MechanismPlotter, Simulation, gather, outer_surface
 from fenicsmech.stress import von_mises
 
@@ -35,6 +36,9 @@ def solve_solid(project: Project, number: int, emit: Callable[[dict[str, Any]], 
     """
     began = perf_counter()
     try:
+        if project["simulation"]["space"] not in ("plane-stress", "plane-strain"):
+            reason = "this mechanism does not exist in the plane, and its curves are those in space already"
+            raise DescriptionError("solid", reason, "Look at the curves of the page")
         drawing = draw({**project, "simulation": {**project["simulation"], "space": "3d-symmetric"}})
         problem = drawing.along_curves(project)
         at = placement(project, problem)
@@ -62,15 +66,15 @@ def solve_solid(project: Project, number: int, emit: Callable[[dict[str, Any]], 
                 "state": "solved",
                 "curve": number,
                 "project": project,
-                "remarks": [] if curve is None else list(curve.remarks),
-                "failed": failure and _told(failure),
+                "remarks": [] if curve is None else remarks(curve),
+                "failed": failure and told(failure),
                 "errors": errors,
                 "seconds": round(perf_counter() - began, 2),
                 **(_surface(simulation, frames) if frames else {"triangles": "", "points": []}),
             }
         )
     except FenicsmechError as error:
-        emit({"event": "solid", "state": "failed", **_told(error)})
+        emit({"event": "solid", "state": "failed", **told(error)})
 
 
 def _check_size(simulation: Simulation, frames: int) -> None:
@@ -123,10 +127,6 @@ def _surface(simulation: Simulation, frames: tuple[Frame, ...]) -> dict[str, Any
 
 def _packed(values: np.ndarray, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode()
-
-
-def _told(error: FenicsmechError) -> dict[str, str]:
-    return {"part": error.part, "problem": error.problem, "remedy": error.remedy}
 
 
 def main() -> None:

@@ -1,12 +1,14 @@
 """The solver process of the live page: tasks come as lines of JSON on standard input, results go to standard output.
 
 A task holds the whole project, so that a process that was ended loses nothing. A new task cancels the one at work, at
-the next iteration of Newton's method or the next factor (``cancel``). ``messages`` describes tasks and results.
+the next iteration of Newton's method or the next factor (``cancel``), and so does the end of its time.
+``messages`` describes tasks and results.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import threading
@@ -21,8 +23,9 @@ from fenicsmech.design import DesignIterate, DesignProblem, HandlePlacement, Lev
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import EquilibriumError, FenicsmechError
 from fenicsmech.live.build import Drawing, draw, placement
-from fenicsmech.live.cancel import Cancellable, Cancelled
+from fenicsmech.live.cancel import Cancellable, Cancelled, TooLong
 from fenicsmech.live.project import Project, drawing, forces_of
+from fenicsmech.live.told import missed, remarks, told, too_long
 from fenicsmech.plot import MechanismShape
 from fenicsmech.polygons import edge_loops
 from fenicsmech.simulation import Frame, MechanismPlotter, Simulation, gather
@@ -45,12 +48,14 @@ class Solver:
     def __init__(self, emit: Emit, cancelled: Callable[[], bool] = lambda: False) -> None:
         self._emit, self._cancelled = emit, cancelled
         self._method = PrimalDualNewton(linear=Cancellable(self.check))
+        self._end = math.inf  # of the time of the task at work
         self._drawn: tuple[str, Drawing] | None = None
         self._problems: dict[str, DesignProblem | None] = {}
 
     def run(self, task: Mapping[str, Any]) -> None:
         """Does a task, whose results carry its number."""
-        began, number = perf_counter(), task["task"]
+        began, number, longest = perf_counter(), task["task"], task.get("longest", math.inf)
+        self._end = began + longest
 
         def emit(event: dict[str, Any]) -> None:
             self._emit({**event, "task": number})
@@ -64,16 +69,20 @@ class Solver:
             emit({"event": "done", "seconds": round(perf_counter() - began, 3)})
         except Cancelled:
             emit({"event": "cancelled"})
+        except TooLong:
+            emit({"event": "failed", **too_long(longest)})
         except FenicsmechError as error:
-            emit({"event": "failed", **_told(error)})
+            emit({"event": "failed", **told(error)})
         except Exception as error:  # whatever happens here, the next gesture is answered
             reason = f"{type(error).__name__}: {error}"
             emit({"event": "failed", "part": "solver", "problem": reason[:400], "remedy": "Undo the last change"})
 
     def check(self) -> None:
-        """Raises Cancelled if another task has come."""
+        """Raises Cancelled if another task has come, and TooLong if the time of this one is over."""
         if self._cancelled():
             raise Cancelled
+        if perf_counter() > self._end:
+            raise TooLong
 
     def drawing(self, project: Project) -> Drawing:
         """The drawing of a project, made when it is new."""
@@ -114,7 +123,7 @@ class Work:
         self._plotter = MechanismPlotter(self._drawing.simulation.model, parts=2)
         solver.check()
         self._meshed, self._shown = False, np.zeros(0)
-        self._steady: dict[int, list[float]] = {}  # forces of each curve, up to where it snaps or is unstable
+        self._steady: dict[int, list[float]] = {}  # values of each curve, up to where it snaps or is unstable
 
     def solve(self) -> None:
         """The curves of the project's design; before that its optimisation where wanted; derivatives at the end."""
@@ -123,26 +132,29 @@ class Work:
             problem = self._solver.problem("targets", self._project, self._drawing.problem)
         if problem is not None:
             own = problem
-            result = own.optimise(start=at, surrogate=None, optimiser=OPTIMISER, watch=lambda it: self._show(own, it))
+            equal = all(target.relation == "equals" for target in own.targets)
+            optimiser = OPTIMISER if equal else None
+            result = own.optimise(start=at, surrogate=None, optimiser=optimiser, watch=lambda it: self._show(own, it))
             at = own.placement(result)
             self._emit(
                 {
                     "event": "fitted",
                     "design": _design(own, at),
                     "misfits": _rounded([target.error for target in result.targets]),
-                    "reason": result.reason,
-                    "converged": result.converged,
+                    "missed": missed(result),
                     "iterations": result.iterations,
                 }
             )
         self._curves(self._drawing.simulation if at is None else self._designed(at))
         self._linearise(at)
+        if self._project.get("requirements"):
+            self._require(at)
 
     def push(self) -> None:
         """The equilibrium under a force that the pointer exerts."""
         at, force = placement(self._project, self._along), self._task["force"]
         simulation = self._drawing.simulation if at is None else self._designed(at)
-        request = self._drawing.request(self._project, self._task["curve"], [force])
+        request = self._drawing.request(self._project, self._task["curve"], [force], pushed=True)
         curve = simulation.compute(request)
         self._emit({"event": "pushed", "curve": self._task["curve"], "point": self._point(curve.frames[-1])})
 
@@ -185,13 +197,16 @@ class Work:
                     "curve": number,
                     "iterate": iterate,
                     "points": [self._point(own) for own in frames],
-                    "remarks": [] if curve is None else list(curve.remarks),
-                    "failed": failure and _told(failure),
+                    "remarks": [] if curve is None else remarks(curve),
+                    "failed": failure and told(failure),
                 }
             )
             if iterate is None:
-                steady = takewhile(lambda own: own.stable and not own.snapped_through, frames)
-                self._steady[number] = [own.force for own in steady if own.force]
+                held = self._project["curves"][number].get("held", False)
+                stable = [own.stable_under_control if held else own.stable for own in frames]
+                good = [own and not frame.snapped_through for own, frame in zip(stable, frames, strict=True)]
+                pairs = zip(forces, good, strict=False)  # fewer frames where it failed
+                self._steady[number] = [value for value, _ in takewhile(lambda pair: pair[1], pairs) if value]
             if curve is not None and iterate is None:
                 peak = curve.frames[-1].peak
                 own = peak and {"value": _number(peak.value), "error": _number(peak.error), "link": peak.link}
@@ -217,9 +232,11 @@ class Work:
             return  # the curve that ends early is told already
         self._solver.check()
         rows, curves = 0, []
-        for forces in reached:
+        for forces, curve in zip(reached, self._project["curves"], strict=True):
             mine = slice(rows, rows + len(forces))
             rows += len(forces)
+            if curve.get("held") or "ratios" in curve:  # no displacements of one force under it
+                forces, mine = [], slice(0)
             own = {"values": found.values[mine], "errors": found.errors[mine], "jacobian": found.jacobian[mine]}
             curves.append({"forces": forces, **{key: _rounded(value) for key, value in own.items()}})
         drawn = {own["name"]: own["shape"] for own in self._project["links"] if own["kind"] == "flexible"}
@@ -244,6 +261,20 @@ class Work:
                 ],
             }
         )
+
+    def _require(self, at: HandlePlacement | None) -> None:
+        """Values of what is required beside the targets on curves."""
+        problem = self._solver.problem("targets", self._project, self._drawing.problem)
+        if problem is None:
+            return
+        try:
+            found = problem.linearise(problem.initial if at is None else at)
+        except EquilibriumError as error:
+            self._emit({"event": "required", "values": [], "failed": told(error)})
+            return
+        rows = np.split(found.values + found.errors, np.cumsum([target.size for target in problem.targets])[:-1])
+        wanted = rows[len(self._project["targets"]) :]
+        self._emit({"event": "required", "values": [_rounded(own) for own in wanted], "failed": None})
 
     def _point(self, frame: Frame) -> dict[str, Any]:
         """A frame as the page draws it, its mesh sent once before."""
@@ -298,10 +329,6 @@ def _turned(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def _design(problem: DesignProblem, at: HandlePlacement) -> dict[str, list[float]]:
     return {"offsets": (at.p - problem.initial).tolist(), "handles": at.theta.tolist()}
-
-
-def _told(error: FenicsmechError) -> dict[str, str]:
-    return {"part": error.part, "problem": error.problem, "remedy": error.remedy}
 
 
 def _number(value: float) -> float | None:

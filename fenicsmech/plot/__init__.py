@@ -6,6 +6,7 @@
 - ``design``: links before and after an optimisation
 - ``shapes``: the content of these pictures
 - ``page``: look, lengths, panels, labels, and PNG files
+- ``library``: matplotlib, imported with the first picture
 """
 
 from fenicsmech.plot.curve import CurveMark, CurveSeries, CurveTarget, plot_curve

@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.colors import to_hex, to_rgb
-from matplotlib.lines import Line2D
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenicsmech.collective import on_one
 from fenicsmech.errors import DescriptionError, counted, real_array, set_fields
+from fenicsmech.plot.library import mpl
 from fenicsmech.plot.page import INK, MUTED, PALETTE, house_style, new_figure, open_frame, save_png
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _DASHES = (0, (3.0, 1.6))  # of unstable parts
 _DOTS = (0, (1.0, 1.6))  # of snap-throughs
@@ -152,7 +153,7 @@ def _line_style(colour: str, *, faint: bool) -> tuple[str, float, float]:
     """Colour and width of the line, and size of the dots on it."""
     if not faint:
         return colour, 2.0, 4.5
-    return to_hex(1.0 - 0.45 * (1.0 - np.array(to_rgb(colour)))), 1.4, 3.2
+    return mpl.to_hex(1.0 - 0.45 * (1.0 - np.array(mpl.to_rgb(colour)))), 1.4, 3.2
 
 
 def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
@@ -177,7 +178,7 @@ def _draw_series(axes: Axes, curve: CurveSeries, colour: str) -> None:
     if len(curve.corrected):
         moved = curve.corrected != points
         bars = np.stack([points, curve.corrected], axis=1)[moved.any(axis=1)]
-        axes.add_collection(LineCollection(bars, colors=colour, lw=0.7 * width, zorder=4.5 - behind))
+        axes.add_collection(mpl.LineCollection(bars, colors=colour, lw=0.7 * width, zorder=4.5 - behind))
         look = {"ms": 1.6 * size, "mec": colour, "mew": 0.7 * width, "zorder": 4.5 - behind}
         axes.plot(*bars[:, 1].T, "|" if moved[:, 0].any() else "_", **look)
 
@@ -211,22 +212,22 @@ def _draw_legend(
         group = [(curve, colour) for curve, colour in zip(series, colours, strict=True) if curve.label == label]
         curve = group[0][0]
         colour, width, size = _line_style(_common([colour for _, colour in group]), faint=curve.faint)
-        handles.append(Line2D([], [], color=colour, label=label, lw=width * curve.joined, marker="o", ms=size))
+        handles.append(mpl.Line2D([], [], color=colour, label=label, lw=width * curve.joined, marker="o", ms=size))
     if any(curve.joined and not curve.stable.all() for curve in series):
         look = {"ls": _DASHES, "lw": 2.0, "marker": "o", "ms": 4.5, "mfc": "white"}
-        handles.append(Line2D([], [], color=MUTED, label="unstable", **look))
+        handles.append(mpl.Line2D([], [], color=MUTED, label="unstable", **look))
     if any(curve.joined and curve.snapped_through.any() for curve in series):
         look = {"ls": _DOTS, "lw": 1.4, "marker": ">", "markevery": (1, 1), "ms": 5}
-        handles.append(Line2D([], [], color=MUTED, label="snap-through", **look))
+        handles.append(mpl.Line2D([], [], color=MUTED, label="snap-through", **look))
     if any(len(curve.corrected) for curve in series):
         handles.append(
-            Line2D([], [], color=MUTED, lw=1.4, marker="|", markevery=(1, 1), ms=7, label="in finer elements")
+            mpl.Line2D([], [], color=MUTED, lw=1.4, marker="|", markevery=(1, 1), ms=7, label="in finer elements")
         )
     for kind, marker in _markers(series).items():
-        handles.append(Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
+        handles.append(mpl.Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:
         colour = _common([target.colour or INK for target in targets])
-        handles.append(Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=colour, mew=1.5, label="target"))
+        handles.append(mpl.Line2D([], [], lw=0, marker="D", ms=8, mfc="none", mec=colour, mew=1.5, label="target"))
     if handles:
         axes.legend(handles=handles, loc="best", framealpha=0.9, edgecolor="none", handlelength=2.8)
 

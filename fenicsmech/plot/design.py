@@ -8,15 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch, Polygon
-from matplotlib.path import Path as Outline
 from scipy.spatial.distance import cdist
 
 from fenicsmech.errors import DescriptionError
+from fenicsmech.plot.library import mpl
 from fenicsmech.plot.page import (
     FLEXIBLE,
     FLEXIBLE_RIM,
@@ -40,6 +38,10 @@ from fenicsmech.plot.page import (
 )
 from fenicsmech.plot.shapes import DesignShape, OutlineShape, Reals, RigidShape
 from fenicsmech.polygons import signed_area
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.path import Path as Outline
 
 _BEFORE, _BEFORE_RIM = "#dfe2e6", "#6b7078"
 _DASHES = (0, (3.5, 2.0))
@@ -95,7 +97,7 @@ def _draw_in_place(
 ) -> None:
     """All links where they are in the mechanism, the rigid ones behind, with dimensions if there is one, else names."""
     for shape in rigid:
-        stage.axes.add_patch(Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
+        stage.axes.add_patch(mpl.Polygon(shape.outline, closed=True, fc=_RIGID, ec=_RIGID_RIM, lw=0.8, zorder=1.5))
     labels = _draw_links(stage, designs, detailed=alone)
     stage.axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
     stage.axes.set_title(subtitle, loc="left")
@@ -128,10 +130,12 @@ def _draw_links(stage: Stage, designs: Sequence[DesignShape], *, detailed: bool)
     axes, loops = stage.axes, []
     for design, view in zip(designs, stage.views, strict=True):
         before, after = design.before, design.after
-        axes.add_patch(PathPatch(_path(before, view), fc=_BEFORE, ec="none", zorder=2))
-        axes.add_patch(PathPatch(_path(after, view), fc=FLEXIBLE, ec=FLEXIBLE_RIM, lw=1.0, joinstyle="round", zorder=3))
+        axes.add_patch(mpl.PathPatch(_path(before, view), fc=_BEFORE, ec="none", zorder=2))
+        axes.add_patch(
+            mpl.PathPatch(_path(after, view), fc=FLEXIBLE, ec=FLEXIBLE_RIM, lw=1.0, joinstyle="round", zorder=3)
+        )
         # over the new shape too: shows where it is thicker than before
-        axes.add_patch(PathPatch(_path(before, view), fc="none", ec=_BEFORE_RIM, lw=0.8, ls=_DASHES, zorder=4))
+        axes.add_patch(mpl.PathPatch(_path(before, view), fc="none", ec=_BEFORE_RIM, lw=0.8, ls=_DASHES, zorder=4))
         if detailed:
             axes.plot(*view(after.centreline).T, color=FLEXIBLE_RIM, lw=0.8, ls=(0, (9, 2, 1.5, 2)), zorder=4.5)
         axes.plot(*view(before.controls).T, lw=0, zorder=4.5, **(_CONTROL | {"mfc": _BEFORE_RIM, "ms": 3.4}))
@@ -214,14 +218,14 @@ def _span(outline: OutlineShape) -> str:
 def _handles(designs: Sequence[DesignShape]) -> dict[str, Handle]:
     """Legend handles by their label."""
     handles: dict[str, Handle] = {
-        "before": Patch(fc=_BEFORE, ec=_BEFORE_RIM, lw=0.8, ls=_DASHES),
-        "after": Patch(fc=FLEXIBLE, ec=FLEXIBLE_RIM, lw=1.0),
+        "before": mpl.Patch(fc=_BEFORE, ec=_BEFORE_RIM, lw=0.8, ls=_DASHES),
+        "after": mpl.Patch(fc=FLEXIBLE, ec=FLEXIBLE_RIM, lw=1.0),
     }
     if any(len(design.after.controls) for design in designs):
-        handles["control point"] = Line2D([], [], lw=0, **_CONTROL)
+        handles["control point"] = mpl.Line2D([], [], lw=0, **_CONTROL)
     if any(len(design.joints) for design in designs):
-        ring = Line2D([], [], lw=0, marker="o", ms=9.0, mfc="white", mec=INK, mew=1.0)
-        handles["joint"] = (ring, Line2D([], [], lw=0, marker="o", ms=3.2, mfc=INK, mec="none"))
+        ring = mpl.Line2D([], [], lw=0, marker="o", ms=9.0, mfc="white", mec=INK, mew=1.0)
+        handles["joint"] = (ring, mpl.Line2D([], [], lw=0, marker="o", ms=3.2, mfc=INK, mec="none"))
     return handles
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import PathPatch
 
+from fenicsmech.plot.library import mpl
 from fenicsmech.plot.page import (
     FLEXIBLE,
     FLEXIBLE_RIM,
@@ -22,6 +22,9 @@ from fenicsmech.plot.page import (
     save_png,
 )
 from fenicsmech.plot.shapes import Reals
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +68,7 @@ def plot_edge(path: str | Path, edge: EdgeSeries, *, title: str = "", labels: tu
         peak = _draw_stress(axes, edge)
         axes.set(xlabel=labels[0], ylabel=labels[1])
         axes.set_title(title, loc="left")
-        plan.add_patch(PathPatch(path_of(edge.outline), fc=FLEXIBLE, ec=FLEXIBLE_RIM, lw=0.6, alpha=0.5, zorder=2))
+        plan.add_patch(mpl.PathPatch(path_of(edge.outline), fc=FLEXIBLE, ec=FLEXIBLE_RIM, lw=0.6, alpha=0.5, zorder=2))
         plan.plot(*edge.points.T, color=PALETTE[0], lw=2.0, clip_on=False, zorder=3)
         plan.plot(*edge.points[0], "o", ms=6.0, mfc=PALETTE[0], mec="white", clip_on=False, zorder=4)
         half = len(edge.points) // 2

@@ -8,23 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.collections import TriMesh
-from matplotlib.colors import LinearSegmentedColormap, Normalize
-from matplotlib.lines import Line2D
-from matplotlib.patches import FancyArrowPatch, PathPatch, Polygon
-from matplotlib.path import Path as Outline
-from matplotlib.ticker import FuncFormatter, MaxNLocator
-from matplotlib.tri import Triangulation
 
 from fenicsmech.errors import DescriptionError
+from fenicsmech.plot.library import mpl
 from fenicsmech.plot.page import (
     FLEXIBLE,
     FLEXIBLE_RIM,
-    HALO,
     HEADING,
     INK,
     LENGTHS,
@@ -36,6 +28,7 @@ from fenicsmech.plot.page import (
     Page,
     Spot,
     draw_pin,
+    halo,
     house_style,
     legend_width,
     normalised,
@@ -46,13 +39,17 @@ from fenicsmech.plot.page import (
 from fenicsmech.plot.shapes import Arrow, FlexibleShape, MechanismShape, Panel, PeakMark, Reals, RigidShape
 from fenicsmech.polygons import edge_loops
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Normalize
+    from matplotlib.path import Path as Outline
+
 _RIGID, _RIGID_RIM = "#c9ccd1", "#6b7078"
 _FIXED, _FIXED_RIM, _FIXED_HATCH = "#565b63", "#2e3238", "#7d838d"
 _PALE = "#c4c4c4"
 _FORCE = "#1d4f9c"
 _TRACES = (PALETTE[2], PALETTE[4], PALETTE[5])
 _HEAT = ("#fff3d6", "#fdd28a", "#f6983f", "#d9542b", "#a01c3b", "#5c0b3e")
-_STRESS = LinearSegmentedColormap.from_list("stress", _HEAT)
 
 
 def draw_configurations(
@@ -89,7 +86,7 @@ def draw_configurations(
         layout.axes[0].set_ylabel(f"y [{unit}]")
         if values is not None:
             _draw_colour_bar(layout, norm, values, colour_label)
-        layout.page.write(title, {label: Line2D([], [], color=c, lw=1.4) for label, c in legend.items()})
+        layout.page.write(title, {label: mpl.Line2D([], [], color=c, lw=1.4) for label, c in legend.items()})
         save_png(layout.page.figure, path)
 
 
@@ -99,7 +96,7 @@ def _filled(panel: Panel) -> MechanismShape:
 
 def _normalise(values: Reals, most: float) -> Normalize:
     low = min(0.0, float(values.min()))
-    return Normalize(low, next(high for high in (most, float(values.max()), low + 1.0) if high > low))
+    return mpl.Normalize(low, next(high for high in (most, float(values.max()), low + 1.0) if high > low))
 
 
 def _draw_panel(axes: Axes, panel: Panel, layout: Layout, norm: Normalize | None) -> None:
@@ -107,12 +104,12 @@ def _draw_panel(axes: Axes, panel: Panel, layout: Layout, norm: Normalize | None
     if panel.deformed:
         still = panel.undeformed
         for outline in (*(path_of([rigid.outline]) for rigid in still.rigid), *map(_rim, still.flexible)):
-            axes.add_patch(PathPatch(outline, fc="none", ec=_PALE, lw=1.0, zorder=2))
+            axes.add_patch(mpl.PathPatch(outline, fc="none", ec=_PALE, lw=1.0, zorder=2))
     for state in panel.deformed[:-1]:
         for rigid in state.rigid:
-            axes.add_patch(Polygon(rigid.outline, closed=True, fc=_RIGID, ec="none", alpha=0.35, zorder=2.5))
+            axes.add_patch(mpl.Polygon(rigid.outline, closed=True, fc=_RIGID, ec="none", alpha=0.35, zorder=2.5))
         for flexible in state.flexible:
-            axes.add_patch(PathPatch(_rim(flexible), fc=FLEXIBLE, ec="none", alpha=0.25, zorder=2.6))
+            axes.add_patch(mpl.PathPatch(_rim(flexible), fc=FLEXIBLE, ec="none", alpha=0.25, zorder=2.6))
     state = _filled(panel)
     for rigid in sorted(state.rigid, key=lambda shape: not shape.fixed):
         _draw_rigid(axes, rigid)
@@ -141,20 +138,22 @@ def _rim(shape: FlexibleShape) -> Outline:
 def _draw_rigid(axes: Axes, shape: RigidShape) -> None:
     face, edge = _RIGID, _RIGID_RIM
     if shape.fixed:
-        axes.add_patch(Polygon(shape.outline, closed=True, fc=_FIXED, ec=_FIXED_HATCH, hatch="////", lw=0.0, zorder=3))
+        axes.add_patch(
+            mpl.Polygon(shape.outline, closed=True, fc=_FIXED, ec=_FIXED_HATCH, hatch="////", lw=0.0, zorder=3)
+        )
         face, edge = "none", _FIXED_RIM
-    axes.add_patch(Polygon(shape.outline, closed=True, fc=face, ec=edge, lw=1.0, zorder=3))
+    axes.add_patch(mpl.Polygon(shape.outline, closed=True, fc=face, ec=edge, lw=1.0, zorder=3))
 
 
 def _draw_flexible(axes: Axes, shape: FlexibleShape, norm: Normalize | None) -> None:
     face = FLEXIBLE
     if shape.values is not None:
         face, corners = "none", shape.points[shape.triangles]
-        look = {"cmap": _STRESS, "norm": norm, "zorder": 4}
+        look = {"cmap": _colours(), "norm": norm, "zorder": 4}
         # each triangle with corners of its own, where values jump between cells
-        apart = Triangulation(*corners.reshape(-1, 2).T, np.arange(corners.size // 2).reshape(-1, 3))
-        axes.add_collection(TriMesh(apart, array=shape.values.ravel(), **look), autolim=False)
-    axes.add_patch(PathPatch(_rim(shape), fc=face, ec=FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
+        apart = mpl.Triangulation(*corners.reshape(-1, 2).T, np.arange(corners.size // 2).reshape(-1, 3))
+        axes.add_collection(mpl.TriMesh(apart, array=shape.values.ravel(), **look), autolim=False)
+    axes.add_patch(mpl.PathPatch(_rim(shape), fc=face, ec=FLEXIBLE_RIM, lw=0.9, joinstyle="round", zorder=4))
 
 
 def _draw_arrow(axes: Axes, arrow: Arrow, scale: float) -> None:
@@ -163,13 +162,13 @@ def _draw_arrow(axes: Axes, arrow: Arrow, scale: float) -> None:
     tail, side = arrow.at - scale * arrow.vector, -normalised(arrow.vector)
     look = {"lw": 2.2, "color": _FORCE, "shrinkA": 0, "shrinkB": 0, "joinstyle": "miter", "zorder": 8}
     style = "-|>,head_length=0.5,head_width=0.26"
-    axes.add_patch(FancyArrowPatch(tail, arrow.at, arrowstyle=style, mutation_scale=15, **look))
+    axes.add_patch(mpl.FancyArrowPatch(tail, arrow.at, arrowstyle=style, mutation_scale=15, **look))
     if arrow.label:
         axes.annotate(
             arrow.label, tail, xytext=5.0 * side, textcoords="offset points", color=_FORCE, fontweight="bold",
             ha="right" if side[0] < -0.5 else "left" if side[0] > 0.5 else "center",
             va="top" if side[1] < -0.5 else "bottom" if side[1] > 0.5 else "center",
-            path_effects=HALO, zorder=9,
+            path_effects=halo(), zorder=9,
         )  # fmt: skip
 
 
@@ -184,11 +183,18 @@ def _draw_peak(axes: Axes, peak: PeakMark, state: MechanismShape) -> None:
     Labels(axes, outlines).add(peak.label, spots, leader=True, **SMALL)
 
 
+def _colours() -> Any:
+    """The colours of stresses."""
+    return mpl.LinearSegmentedColormap.from_list("stress", _HEAT)
+
+
 def _draw_colour_bar(layout: Layout, norm: Normalize, values: np.ndarray, label: str) -> None:
     over, under = values.max() > norm.vmax, values.min() < norm.vmin
     extend = "both" if over and under else "max" if over else "min" if under else "neither"
-    bar = layout.page.figure.colorbar(ScalarMappable(norm, _STRESS), cax=layout.bar, extend=extend, extendfrac=0.04)
-    bar.locator, bar.formatter = MaxNLocator(5), FuncFormatter(lambda value, _: f"{value:.3g}")
+    bar = layout.page.figure.colorbar(
+        mpl.ScalarMappable(norm, _colours()), cax=layout.bar, extend=extend, extendfrac=0.04
+    )
+    bar.locator, bar.formatter = mpl.MaxNLocator(5), mpl.FuncFormatter(lambda value, _: f"{value:.3g}")
     bar.set_label(label)
     bar.outline.set_linewidth(0.6)
 

@@ -10,33 +10,31 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-import matplotlib
 import numpy as np
-from matplotlib import patheffects
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
-from matplotlib.path import Path as Outline
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 from numpy.typing import ArrayLike, NDArray
 
 from fenicsmech.errors import DescriptionError
 from fenicsmech.files import atomic_write
+from fenicsmech.plot.library import mpl
 from fenicsmech.polygons import divided
 
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.path import Path as Outline
+    from matplotlib.text import Text
+    from matplotlib.transforms import Bbox
+
 Reals = NDArray[np.float64]
-Handle: TypeAlias = Artist | tuple[Artist, ...]
+Handle: TypeAlias = "Artist | tuple[Artist, ...]"
 
 DPI = 150
 INK, MUTED = "#333333", "#777777"
 FLEXIBLE, FLEXIBLE_RIM = "#f39c3d", "#a85b0b"
 PALETTE = ("#2166ac", "#d95f02", "#1b9e77", "#b2182b", "#7570b3", "#8c6d31")
-HALO = (patheffects.withStroke(linewidth=2.5, foreground="white"),)
 HEADING: dict[str, Any] = {"fontsize": 11.5, "fontweight": "bold"}
 TITLE: dict[str, Any] = {"fontsize": 10.5, "fontweight": "bold"}
 NAME: dict[str, Any] = {"fontsize": 9.5, "fontweight": "bold"}
@@ -89,13 +87,13 @@ def house_style() -> AbstractContextManager[None]:
         "xtick.color": MUTED, "ytick.color": MUTED, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
         "hatch.linewidth": 0.7,
     }  # fmt: skip
-    return matplotlib.rc_context(look)
+    return mpl.rc_context(look)
 
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of ``width`` × ``height`` inches with its own Agg canvas."""
-    figure = Figure(figsize=(width, height), dpi=DPI)
-    FigureCanvasAgg(figure)
+    figure = mpl.Figure(figsize=(width, height), dpi=DPI)
+    mpl.FigureCanvasAgg(figure)
     return figure
 
 
@@ -113,6 +111,11 @@ def legend_width(labels: Iterable[str]) -> float:
     return sum(text_size(label, **LEGEND)[0] + LENGTHS.key for label in labels)
 
 
+def halo() -> tuple[Any, ...]:
+    """The rim of labels, which keeps them legible on what they cover."""
+    return (mpl.withStroke(linewidth=2.5, foreground="white"),)
+
+
 def open_frame(axes: Axes) -> None:
     """Keeps only the left and the bottom line of the frame."""
     axes.spines[["top", "right"]].set_visible(False)
@@ -122,15 +125,15 @@ def draw_pin(axes: Axes, at: ArrayLike, radius: float, *, welded: bool = False) 
     """Draws a joint at ``at`` (2,): a ring with a dot or, of a weld, a square; over all but arrows and labels."""
     side = 1.4 * radius
     if welded:
-        axes.add_patch(Rectangle(np.subtract(at, 0.5 * side), side, side, fc=INK, ec="white", lw=1.0, zorder=6))
+        axes.add_patch(mpl.Rectangle(np.subtract(at, 0.5 * side), side, side, fc=INK, ec="white", lw=1.0, zorder=6))
     else:
-        axes.add_patch(Circle(at, radius, fc="white", ec=INK, lw=1.0, zorder=6))
-        axes.add_patch(Circle(at, 0.35 * radius, fc=INK, ec="none", zorder=6))
+        axes.add_patch(mpl.Circle(at, radius, fc="white", ec=INK, lw=1.0, zorder=6))
+        axes.add_patch(mpl.Circle(at, 0.35 * radius, fc=INK, ec="none", zorder=6))
 
 
 def path_of(loops: Iterable[Reals]) -> Outline:
     """Closed loops (n, 2) as one path, which fills without the seams that single triangles leave."""
-    return Outline.make_compound_path(*(Outline(np.vstack((loop, loop[:1])), closed=True) for loop in loops))
+    return mpl.Path.make_compound_path(*(mpl.Path(np.vstack((loop, loop[:1])), closed=True) for loop in loops))
 
 
 def normalised(vectors: Reals) -> Reals:
@@ -210,7 +213,7 @@ class Labels:
         self._axes, self._renderer = axes, axes.figure.canvas.get_renderer()
         self._point = axes.figure.dpi / 72.0  # pixels
         self._frame = axes.get_window_extent(self._renderer)
-        self._shapes = [Outline(axes.transData.transform(shape)) for shape in shapes]
+        self._shapes = [mpl.Path(axes.transData.transform(shape)) for shape in shapes]
         closed = [np.vstack((path.vertices, path.vertices[:1])) for path in self._shapes]
         dense = [divided(loop, 3.0 * self._point) for loop in closed]
         self._lines = np.concatenate(dense) if dense else np.empty((0, 2))
@@ -221,7 +224,7 @@ class Labels:
 
         With ``leader``, a thin line connects the anchor with a label that is not right beside it.
         """
-        label = self._axes.text(0.0, 0.0, text, ha="center", va="center", path_effects=HALO, zorder=9, **style)
+        label = self._axes.text(0.0, 0.0, text, ha="center", va="center", path_effects=halo(), zorder=9, **style)
         extent = label.get_window_extent(self._renderer)
         half = 0.5 * np.array([extent.width, extent.height])
         best = np.inf, np.zeros(2), spots[0], 0.0
@@ -234,7 +237,7 @@ class Labels:
                 if cost < best[0]:
                     best = cost, centre, spot, gap
         _, centre, spot, gap = best
-        self._taken.append(Bbox([centre - half, centre + half]))
+        self._taken.append(mpl.Bbox([centre - half, centre + half]))
         back = self._axes.transData.inverted()
         label.set_position(back.transform(centre))
         if leader and gap > _COSTS.gaps[0]:
@@ -246,7 +249,7 @@ class Labels:
     def _cost(self, centre: Reals, half: Reals) -> float:
         air = half + _COSTS.margin * self._point
         low, high = centre - air, centre + air
-        box = Bbox([low, high])
+        box = mpl.Bbox([low, high])
         cost = _COSTS.label * sum(box.overlaps(other) for other in self._taken)
         cost += _COSTS.filled * sum(bool(shape.contains_point(centre)) for shape in self._shapes)
         cost += _COSTS.line * float(((self._lines > low) & (self._lines < high)).all(axis=1).sum())

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 from contextlib import contextmanager
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from time import monotonic, sleep
@@ -26,7 +27,8 @@ from selenium.webdriver.common.actions.pointer_input import PointerInput
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-from fenicsmech.live import Server, ServerOptions, example
+import fenicsmech as fm
+from fenicsmech.live import Server, ServerOptions, example, project_of
 
 pytestmark = pytest.mark.slow
 PICTURES = Path(__file__).parents[2] / "results" / "live"
@@ -361,7 +363,7 @@ def test_a_curve_of_a_new_force_is_added_dragged_and_removed(page):
     choose(page, "move")
 
 
-def test_the_button_for_curves_rests_at_the_last_that_a_project_may_have(page):
+def test_the_button_for_curves_rests_at_the_last_that_the_page_adds(page):
     add = page.chrome.find_element(By.ID, "add-curve")
     for count in (2, 3, 4):
         add.click()
@@ -372,6 +374,22 @@ def test_the_button_for_curves_rests_at_the_last_that_a_project_may_have(page):
     assert add.is_enabled()
     page.until("document.body.dataset.solver === 'idle'")
     choose(page, "move")
+
+
+def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
+    switch = import_module("demos.switch")
+    described = switch.describe()
+    sim = fm.Simulation(described[0], space="plane-stress", size=4.0, order=1)
+    project = project_of(fm.DesignProblem(sim, **switch.wanted(*described)))
+    page.chrome.execute_script("live.send({kind: 'open', project: arguments[0]})", project)
+    page.until("live.store.project.name === 'switch' && live.store.required.length === 2")
+    told = [item.text for item in page.chrome.find_elements(By.CSS_SELECTOR, "#carried li")]
+    assert len(told) == 3 and all("reached" in own for own in told[:2]) and "spring" in told[2]
+    assert page.run("return live.store.curves[0].points.at(-1).displacement") == pytest.approx(15.0)
+    page.picture("script")
+    page.run("live.send({kind: 'example', name: 'truss-finger'})")
+    page.until("live.store.project.name === 'truss finger' && !document.querySelector('#carried li')")
+    page.settled()
 
 
 @pytest.fixture

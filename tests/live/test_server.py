@@ -7,9 +7,14 @@ import json
 import math
 import os
 import random
+import re
 import signal
+import subprocess
 import sys
+import urllib.error
+import urllib.request
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import aiohttp
@@ -177,6 +182,26 @@ def test_a_solver_process_that_hangs_is_replaced_at_the_next_gesture():
     run(test)
 
 
+def test_a_solver_process_that_does_not_end_its_task_in_time_is_replaced_and_the_reason_told():
+    begins = ECHO.replace(
+        "        if task",
+        '        print(json.dumps({"event": "began", "task": task["task"]}), flush=True)\n        if task',
+        1,
+    )
+    options = replace(OPTIONS, solver=(sys.executable, "-c", begins), longest_solve=0.2)
+
+    async def test(server, client):
+        async with socket(server, client) as page:
+            await until(page, "remark")
+            await page.send_str(edit(6.66))
+            failed = await until(page, "failed")
+            assert "longer than 0.2 s" in failed["problem"] and "larger elements" in failed["remedy"]
+            await page.send_str(edit(7.0))
+            assert (await until(page, "remark"))["targets"][1]["displacement"] == 7.0
+
+    run(test, options=options)
+
+
 def test_a_page_has_stored_results_of_its_project_before_the_solver_answers(tmp_path, monkeypatch):
     card = tmp_path / "package" / "rubber.toml"
     card.parent.mkdir()
@@ -316,6 +341,43 @@ def test_the_address_is_not_on_the_command_line_of_the_browser(monkeypatch, caps
         serve(example("truss-finger"), options=OPTIONS)
     (door,), (address, token) = opened, capsys.readouterr().out.split()[-1].rstrip("/").rsplit("/", 1)
     assert door.startswith(f"{address}/open/") and len(token) == 32 and token not in door
+
+
+SCRIPT = """
+import sys
+import fenicsmech as fm
+beam = fm.Mechanism("beam")
+ground = beam.rigid("ground", fixed=True)
+leaf = beam.flexible("leaf", fm.strip([(0, 0), (40, 0)], thickness=2.0, depth=5.0), fm.ONYX)
+beam.weld(ground, leaf, at=(0, 0), interface_radius=2.0)
+pull = beam.force(on=leaf, at=(40, 0), direction=(0, 1))
+sim = fm.Simulation(fm.Scene(beam), space="plane-stress", size=2.0)
+targets = [fm.Target(pull, force=0.1, displacement=1.0)]
+fm.live(fm.DesignProblem(sim, [fm.SplineDesign(leaf, 2)], targets=targets), browse=False)
+print("ended", file=sys.stderr)
+"""
+
+
+@pytest.mark.thorough
+def test_a_script_serves_its_problem_here_alone_under_a_token_until_it_is_interrupted():
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", SCRIPT], stdout=pipe, stderr=pipe, text=True) as process:
+        try:
+            address = process.stdout.readline().split()[-1]
+            host, token = re.fullmatch(r"http://([^:]+):\d+/([\w-]{32})/", address).groups()
+            with urllib.request.urlopen(address) as page:
+                assert host == "127.0.0.1" and page.status == 200
+            with urllib.request.urlopen(address + "export/project") as found:
+                assert json.load(found)["targets"][0]["displacement"] == 1.0
+            with pytest.raises(urllib.error.HTTPError, match="403"):
+                urllib.request.urlopen(address.replace(token, "x" * 32))
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            solvers = [own for own in children if "live.solver" in Path(f"/proc/{own}/cmdline").read_text()]
+            process.send_signal(signal.SIGINT)
+            assert "ended" in process.communicate(timeout=30)[1] and process.returncode == 0
+            assert solvers and not any(Path(f"/proc/{own}").exists() for own in solvers)
+        finally:
+            process.kill()
 
 
 def test_the_address_that_opens_the_browser_works_once_soon_and_here_alone():

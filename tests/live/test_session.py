@@ -59,7 +59,7 @@ def test_examples_are_projects_that_survive_their_file(name, tmp_path):
         (["targets", 0, "curve"], 3, "targets[0].curve"),
         (["name"], "a\nb", "name"),
         (["format"], "something else", "format"),
-        (["simulation", "space"], "3d", "simulation.space"),
+        (["simulation", "space"], "4d", "simulation.space"),
         (["simulation", "size"], 0.01, "simulation.size"),
         (["links", 4, "shape", "line"], [[0, 0], [5e4, 5e4]], "simulation.size"),
         (["links", 4, "shape"], {"kind": "polygon", "corners": SLIVER, "depth": 20.0}, "simulation.size"),

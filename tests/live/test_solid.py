@@ -76,6 +76,24 @@ def test_a_surface_too_large_for_a_page_is_told_before_it_is_solved(project, mon
 WAITS = 'import json, sys, time; json.load(sys.stdin); print(\'{"state": "solving"}\', flush=True); time.sleep(1000)'
 
 
+def test_a_job_whose_time_is_over_is_ended_and_told_with_its_remedy():
+    async def run():
+        told, failed = [], asyncio.Event()
+
+        def receive(event):
+            told.append(event)
+            if event["state"] == "failed":
+                failed.set()
+
+        job = Job((sys.executable, "-c", WAITS), receive, longest=1.0)
+        await job.start({})
+        await asyncio.wait_for(failed.wait(), 30)
+        return told[-1], await job.stop()
+
+    failed, stopped = asyncio.run(run())
+    assert "longer than 1 s" in failed["problem"] and "larger elements" in failed["remedy"] and not stopped
+
+
 @pytest.mark.parametrize(
     ("code", "state"),
     [

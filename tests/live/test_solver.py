@@ -6,6 +6,8 @@ import json
 import math
 import re
 import runpy
+import sys
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +27,9 @@ def solved(project, *, fit=False, cancelled=lambda events: False, kind="solve", 
     )
     solver.run({"task": 1, "kind": kind, "project": project, "fit": fit, **more})
     return events
+
+
+HELD = {"held": True, "largest": 15.0, "steps": 5}  # mm
 
 
 def only(events, name):
@@ -123,9 +128,38 @@ def test_a_snap_is_told_with_its_force_and_the_preview_ends_before_it():
     (before, after) = next(pair for pair in pairwise(curve["points"]) if pair[1]["snapped"])
     assert after["displacement"] > 5.0 * before["displacement"]
     assert "snaps after force" in curve["remarks"][0] and curve["failed"] is None
+    assert "Make the largest force smaller" in curve["remarks"][0]
     assert not linear["whole"] and linear["curves"][0]["forces"][-1] == before["force"]
     # the curve is that of the drawn strip, the preview that of its spline
     assert linear["curves"][0]["values"][-1] == pytest.approx(before["displacement"], rel=0.02)
+
+
+def test_an_unstable_part_is_told_with_its_remedy_and_ends_the_preview():
+    change = {"kind": "set", "path": ["simulation", "order"], "value": 1}
+    held = {"kind": "set", "path": ["curves", 0], "value": {**example("snapping-switch")["curves"][0], **HELD}}
+    clear = [{"kind": "remove", "path": ["targets", 0]}] * len(example("snapping-switch")["targets"])
+    events = solved(edited(example("snapping-switch"), [change, *clear, held]))
+    (curve,) = only(events, "curve")
+    assert not all(point["stable"] for point in curve["points"])
+    assert (
+        "unstable under dead loads" in curve["remarks"][-1] and "Make the largest force smaller" in curve["remarks"][-1]
+    )
+
+
+@pytest.mark.thorough
+def test_a_target_out_of_reach_is_told_with_its_reason_remedy_and_bounds():
+    beam = fm.Mechanism("beam")
+    ground = beam.rigid("ground", fixed=True)
+    leaf = beam.flexible("leaf", fm.strip([(0, 0), (40, 0)], thickness=2.0, depth=5.0), fm.ONYX)
+    beam.weld(ground, leaf, at=(0, 0), interface_radius=2.0)
+    pull = beam.force(on=leaf, at=(40, 0), direction=(0, 1))
+    sim = fm.Simulation(fm.Scene(beam), space="plane-stress", size=2.0, order=1)
+    design, target = fm.SplineDesign(leaf, 1, thickness=(1.9, 2.1)), fm.Target(pull, force=0.1, displacement=0.05)
+    events = solved(project_of(fm.DesignProblem(sim, [design], targets=[target])), fit=True)
+    (fitted,), (linear,) = only(events, "fitted"), only(events, "linear")
+    missed = fitted["missed"]
+    assert "targets are missed by up to" in missed["problem"] and "Relax a target" in missed["remedy"]
+    assert any("thickness" in bound for bound in linear["active"])
 
 
 @pytest.mark.thorough
@@ -140,6 +174,26 @@ def test_both_configurations_of_a_motor_follow_their_targets():
     events = solved(project, fit=True)
     assert max(map(abs, only(events, "fitted")[0]["misfits"])) < 0.01
     assert {event["curve"] for event in only(events, "curve") if event["iterate"] is None} == {0, 1}
+
+
+def test_a_solve_whose_time_is_over_keeps_the_last_iterate_and_tells_its_reason_and_remedy(finished, monkeypatch):
+    project, _ = finished
+    other = edited(project, [{"kind": "set", "path": ["targets", 1, "displacement"], "value": 7.5}])
+    events, now = [], time.perf_counter
+
+    def late():
+        return now() + 1000.0 * (len(only(events, "iterate")) > 1)
+
+    monkeypatch.setattr(sys.modules["fenicsmech.live.solver"], "perf_counter", late)
+    solver = Solver(events.append)
+    solver.run({"task": 1, "kind": "solve", "project": other, "fit": True, "longest": 600.0})
+    failed, iterates = events[-1], only(events, "iterate")
+    assert len(iterates) == 2 and iterates[-1]["design"]["offsets"] != project["design"]["offsets"]
+    assert failed["part"] == "time limit" and "longer than 600 s" in failed["problem"]
+    assert "larger elements" in failed["remedy"]
+    events.clear()
+    solver.run({"task": 2, "kind": "push", "curve": 0, "force": 0.2, "project": project, "fit": False})
+    assert events[-1]["event"] == "done"
 
 
 def test_a_push_moves_as_far_as_the_curve_says(finished):
@@ -189,6 +243,19 @@ def test_a_project_is_exported_as_files_that_others_read(finished, what, names, 
                 assert picture.format != "GIF" or picture.n_frames == there_and_back
 
 
+@pytest.mark.thorough
+def test_pictures_and_animations_are_made_of_every_curve(tmp_path):
+    project = example("four-bar-with-a-motor")
+    project = edited(project, [{"kind": "set", "path": ["curves", k, "steps"], "value": 2} for k in range(2)])
+    for what, names in (
+        ("png", ["curve-1.png", "mechanism-1.png", "curve-2.png", "mechanism-2.png"]),
+        ("animation", ["animation-1.gif", "animation-2.gif"]),
+    ):
+        paths = export(project, what, tmp_path)
+        assert [path.name for path in paths] == names
+        assert len({path.read_bytes() for path in paths}) == len(paths)
+
+
 def test_names_of_a_project_cannot_put_code_into_its_script(finished, tmp_path):
     project, _ = finished
     name = '"""+__import__("os").system("x")+"""'
@@ -216,46 +283,3 @@ def test_an_outline_is_exported_as_dxf_in_its_place(finished, tmp_path):
     assert points.min(axis=0) == pytest.approx([-3.0, -3.0], abs=0.3) and points.max(axis=0) == pytest.approx(
         [43.0, 63.0], abs=0.3
     )
-
-
-def test_a_problem_of_a_script_is_the_project_that_describes_it():
-    drawn = example("truss-finger")
-    finger = fm.Mechanism("truss finger")
-    base = finger.rigid("base", fixed=True)
-    left, right, tip = (finger.rigid(name) for name in ("left leg", "right leg", "tip"))
-    shape = fm.strip([(0, 0), (18, 34), (40, 60)], thickness=3.0, depth=20.0)
-    diagonal = finger.flexible("diagonal", shape, fm.SMOOTH_SIL_950)
-    for (a, b), at, name in (
-        ((base, left), (0, 0), "foot of left leg"),
-        ((base, right), (40, 0), "foot of right leg"),
-        ((left, tip), (0, 60), "head of left leg"),
-        ((right, tip), (40, 60), "head of right leg"),
-    ):
-        finger.revolute(a, b, at=at, name=name)
-    finger.revolute(base, diagonal, at=(0, 0), interface_radius=3.0, name="foot of diagonal")
-    finger.revolute(diagonal, tip, at=(40, 60), interface_radius=3.0, name="head of diagonal")
-    push = finger.force(on=tip, at=(20, 70), direction=(1, 0), name="push on tip")
-    sim = fm.Simulation(fm.Scene(finger), space="3d", size=3.0)
-    targets = [fm.Target(push, force=0.1, displacement=6.0), fm.Target(push, force=0.4, displacement=9.0)]
-    problem = fm.DesignProblem(sim, [fm.SplineDesign(diagonal, segments=3, thickness=(1.5, 6.0))], targets=targets)
-    assert project_of(problem) == drawn | {"design": None}
-
-
-def test_a_problem_that_the_page_does_not_know_is_refused_by_name():
-    beam = fm.Mechanism("beam")
-    ground, link = (
-        beam.rigid("ground", fixed=True),
-        beam.flexible(
-            "rubber",
-            fm.strip([(0, 0), (40, 0)], thickness=2.0, depth=5.0),
-            fm.Material("rubber", law=fm.Yeoh(1.0, 0.1, 0.0, nu=0.45)),
-        ),
-    )
-    beam.weld(ground, link, at=(0, 0), interface_radius=2.0)
-    pull = beam.force(on=link, at=(40, 0), direction=(0, 1))
-    sim = fm.Simulation(fm.Scene(beam), space="plane-strain", size=2.0)
-    problem = fm.DesignProblem(
-        sim, [fm.SplineDesign(link, segments=1)], targets=[fm.Target(pull, force=0.1, displacement=1.0)]
-    )
-    with pytest.raises(fm.DescriptionError, match="Yeoh"):
-        project_of(problem)

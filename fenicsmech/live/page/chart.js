@@ -19,7 +19,7 @@ export class Chart {
   // Ranges of displacement and force that are shown; they stay while a target is dragged.
   range() {
     const { store } = this, own = store.curve(), number = store.shown;
-    const x = [0], y = [0, store.project.curves[number].largest];
+    const { held, largest } = store.project.curves[number], x = held ? [0, largest] : [0], y = held ? [0] : [0, largest];
     for (const point of own ? own.points : []) { x.push(point.displacement); y.push(point.force); }
     const before = store.before();
     for (const [displacement, force] of before ? before.points : []) { x.push(displacement); y.push(force); }
@@ -99,11 +99,12 @@ export class Chart {
     points.forEach(([a, b], k) => {
       const point = own.points[k], error = errors[k] || 0;
       if (error) {
-        const [c] = this.px([point.displacement + error, 0]);
-        drawn.push(make("line", { class: "whisker", x1: a, x2: c, y1: b, y2: b }));
+        const { held } = store.project.curves[store.shown];
+        const [c, d] = this.px(held ? [point.displacement, point.force + error] : [point.displacement + error, point.force]);
+        drawn.push(make("line", { class: "whisker", x1: a, x2: c, y1: b, y2: d }));
       }
       const dot = make("circle", { class: point.snapped ? "dot snapped" : "dot", cx: a, cy: b, r: point.snapped ? 5 : 2.8 });
-      const more = `${error ? `, finer elements add ${figure(error, 2)} mm` : ""}${point.stable ? "" : ", unstable"}${point.snapped ? ", snapped on the way here" : ""}`;
+      const more = `${error ? `, finer elements add ${figure(error, 2)} ${store.project.curves[store.shown].held ? "N" : "mm"}` : ""}${point.stable ? "" : ", unstable"}${point.snapped ? ", snapped on the way here" : ""}`;
       dot.append(make("title", {}, `${figure(point.displacement, 4)} mm at ${figure(point.force, 3)} N${more}; stress ${figure(point.stress, 3)} MPa`));
       drawn.push(dot);
     });

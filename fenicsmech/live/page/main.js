@@ -1,5 +1,6 @@
 // The page: one store of what the server has sent, the two pictures, and the controls.
 
+import { listCarried } from "./carried.js";
 import { Chart } from "./chart.js";
 import { Handles } from "./handles.js";
 import { connect } from "./net.js";
@@ -13,7 +14,7 @@ const $ = (id) => document.getElementById(id);
 
 const store = {
   project: null, mesh: null, curves: {}, errors: {}, peaks: {}, linear: null, misfits: null, first: [],
-  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], opened: 0, added: null,
+  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null,
 
   curve() { return this.curves[this.shown]; },
   // The mesh of what is drawn: another curve may still be that of an earlier shape.
@@ -67,7 +68,8 @@ const receivers = {
     const other = store.opened !== more.opened;
     store.project = project;
     Object.assign(store, more);
-    if (other) { store.curves = {}; store.errors = {}; store.peaks = {}; store.linear = null; store.solid = null; view.forced = true; }
+    if (other) { store.curves = {}; store.errors = {}; store.peaks = {}; store.linear = null; store.solid = null; store.required = []; view.forced = true; }
+    listCarried($("carried"), project, store.required);
     if (chart.held && !project.targets[chart.held.index]) { chart.held.sent = false; chart.release(true); } // it was removed elsewhere
     const added = project.curves.findIndex((own) => own.name === store.added);
     if (added >= 0) { store.shown = added; store.added = null; }
@@ -118,12 +120,16 @@ const receivers = {
     view.fit(); show(); chart.draw(); listTargets();
   },
   errors({ curve, errors, peak }) { store.errors[curve] = errors; store.peaks[curve] = peak; chart.draw(); listTargets(); },
-  fitted({ misfits, reason, converged, design }) {
+  fitted({ misfits, missed, design }) {
     store.project.design = design;
     store.misfits = misfits;
-    const missed = misfits.some((own) => Math.abs(own) > 0.01);
-    if (missed || !converged) tell(`Targets are missed by up to ${figure(100 * Math.max(...misfits.map(Math.abs)), 2)} %: ${reason}. Relax a target, widen the thicknesses, or move a joint.`, true);
+    if (missed) tell(`${missed.problem[0].toUpperCase()}${missed.problem.slice(1)}. ${missed.remedy}.`, true);
     listTargets();
+  },
+  required({ values, failed }) {
+    store.required = values;
+    listCarried($("carried"), store.project, values);
+    if (failed) tell(`What is required: ${failed.problem}. ${failed.remedy}.`, true);
   },
   linear(event) {
     store.linear = event;
@@ -231,9 +237,10 @@ function between(points, x) {
 function stiffness() {
   const own = store.curve(), errors = store.errors[store.shown] || [];
   if (!own || own.points.length < 2) { $("stiffness-now").textContent = ""; return; }
-  const end = own.points.at(-1), value = end.displacement + (errors[own.points.length - 1] || 0), now = end.force / value;
+  const end = own.points.at(-1), error = errors[own.points.length - 1] || 0, { held } = store.project.curves[store.shown];
+  const value = end.displacement + (held ? 0 : error), now = (end.force + (held ? error : 0)) / value;
   const first = store.before(), then = first && between(first.points.map(([displacement, force]) => [force, displacement]), end.force);
-  const change = then && value && store.errors[store.shown] ? 100 * (then / value - 1) : 0; // both with their errors
+  const change = !held && then && value && store.errors[store.shown] ? 100 * (then / value - 1) : 0; // both with their errors
   const more = Math.abs(change) > 0.3 ? `, ${figure(Math.abs(change), 2)} % ${change > 0 ? "stiffer" : "softer"} than at first` : "";
   const peak = store.peaks[store.shown], stress = peak ? `; stress up to ${figure(peak.value)} ± ${figure(peak.error, 1)} MPa` : "";
   $("stiffness-now").textContent = `${figure(now)} N/mm at ${figure(end.force)} N${more}${stress}`;

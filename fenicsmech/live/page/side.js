@@ -39,7 +39,7 @@ export class Side {
       parts.push(this.group(link.name, ...fields));
     });
     const n = this.store.shown, curve = project.curves[n], loads = [
-      this.number("largest [N]", curve.largest, (value) => {
+      this.number(curve.held ? "largest [mm]" : "largest [N]", curve.largest, (value) => {
         const ratio = value / curve.largest, changes = [{ kind: "set", path: ["curves", n, "largest"], value }];
         if (!(ratio > 0)) return;
         this.store.project.targets.forEach((target, k) => {
