@@ -34,7 +34,7 @@ from fenicsmech.mechanism import (
     polygon,
     strip,
 )
-from fenicsmech.quantities import Displacement, Sample
+from fenicsmech.quantities import Displacement, JointPosition, MotorOffset, NumberKind, Sample
 from fenicsmech.simulation import CurveRequest, Simulation, read_request
 
 _PAPER = {"SMOOTH_SIL_950": SMOOTH_SIL_950, "ONYX": ONYX}
@@ -95,6 +95,20 @@ class Drawing:
             self.target(project, number, force, 1.0) for number, own in enumerate(forces) for force in own if force
         ]
         return self._problem(designs, targets) if designs else None
+
+    def movable(self, project: Project) -> list[tuple[dict[str, Any], NumberKind]]:
+        """What can be moved beside the shapes: joints that share a place along x and y, and motors; as the page names
+        them, and as numbers."""
+        places: dict[tuple[float, float], list[int]] = {}
+        for k, own in enumerate(project["joints"]):
+            places.setdefault(tuple(own["at"]), []).append(k)
+        found: list[tuple[dict[str, Any], NumberKind]] = []
+        for numbers in places.values():
+            joints = [self.joints[project["joints"][k]["name"]] for k in numbers]
+            for axis, direction in enumerate(((1.0, 0.0), (0.0, 1.0))):
+                kind = JointPosition(*joints, direction=direction)
+                found.append(({"kind": "joint", "joints": numbers, "axis": axis}, kind))
+        return found + [({"kind": "motor", "name": name}, MotorOffset(own)) for name, own in self.motors.items()]
 
     def _problem(self, designs: Sequence[SplineDesign], targets: Sequence[Target]) -> DesignProblem:
         """A problem that shares the handles of the first one: links that change are part of the drawing."""

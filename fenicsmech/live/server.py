@@ -66,7 +66,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 # results that a page which is opened later needs
-_KEPT = ("mesh", "curve", "errors", "linear", "fitted", "iterate", "failed")
+_KEPT = ("mesh", "curve", "responses", "errors", "linear", "fitted", "iterate", "failed")
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,53 @@ def test_the_linear_preview_is_the_derivative_of_the_curve(finished):
     assert np.array(own["jacobian"]) @ step == pytest.approx(change, rel=0.02, abs=0.02 * np.abs(change).max())
 
 
+def displacements(project):
+    """Of the first curve, from its second frame on."""
+    return np.array([point["displacement"] for point in only(solved(project), "curve")[0]["points"][1:]])
+
+
+@pytest.mark.thorough
+def test_the_linear_preview_of_a_joint_is_that_of_the_mechanism_drawn_there(finished):
+    project, events = finished
+    (linear,), moved = only(events, "linear"), []
+    column = linear["moves"].index({"kind": "joint", "joints": [3, 5], "axis": 0}) + len(linear["lengths"])
+    for x in (-0.2, 0.2):
+        changes = [{"kind": "set", "path": ["joints", k, "at"], "value": [40 + x, 60]} for k in (3, 5)]
+        bend = np.hypot(18, 34) / (np.hypot(18, 34) + np.hypot(22, 26))
+        line = [[0, 0], [18 + bend * x, 34], [40 + x, 60]]
+        changes.append({"kind": "set", "path": ["links", 4, "shape", "line"], "value": line})
+        moved.append(displacements(edited(project, changes)))
+    slope = np.array(linear["curves"][0]["jacobian"])[:, column]
+    assert slope == pytest.approx((moved[1] - moved[0]) / 0.4, rel=0.05)
+    controls = np.array(linear["links"][0]["follows"])[..., linear["moves"].index(linear["moves"][0])]
+    assert controls[:, 0, 0] == pytest.approx([1, 2 / 3, 1 / 3, 0])  # with the foot along x
+
+
+@pytest.mark.thorough
+def test_the_linear_preview_of_a_motor_is_that_of_the_mechanism_turned():
+    project = edited(
+        example("four-bar-with-a-motor"),
+        [
+            {"kind": "set", "path": ["curves", 0, "steps"], "value": 2},
+            {"kind": "set", "path": ["simulation", "order"], "value": 1},
+        ],
+    )
+    events = solved(project)
+    (linear,), moved, begins = only(events, "linear"), [], []
+    ((name, rates),) = only(events, "responses")[0]["motors"].items()
+    column = linear["moves"].index({"kind": "motor", "name": name}) + len(linear["lengths"])
+    at = project["curves"][0]["positions"].get(name, 0.0)
+    for turn in (-0.05, 0.05):
+        change = {"kind": "set", "path": ["curves", 0, "positions"], "value": {name: at + turn}}
+        points = only(solved(edited(project, [change])), "curve")[0]["points"]
+        moved.append(np.array([point["displacement"] for point in points[1:]]))
+        begins.append(every(points[0]))
+    slope = np.array(linear["curves"][0]["jacobian"])[:, column]
+    assert slope == pytest.approx((moved[1] - moved[0]) / 0.1, rel=0.01)
+    rate = (begins[1] - begins[0]) / 0.1
+    assert every(rates) == pytest.approx(rate, abs=0.01 * np.abs(rate).max())
+
+
 @pytest.mark.thorough
 def test_a_new_gesture_ends_an_optimisation_at_its_next_iterate(finished):
     project, _ = finished
@@ -142,12 +189,46 @@ def test_both_configurations_of_a_motor_follow_their_targets():
     assert {event["curve"] for event in only(events, "curve") if event["iterate"] is None} == {0, 1}
 
 
+def push(project, force, at=None, by=(0.0, 0.0)):
+    """The answer to a push."""
+    (pushed,) = only(solved(project, kind="push", curve=0, force=force, at=at, by=list(by)), "pushed")
+    return pushed
+
+
 def test_a_push_moves_as_far_as_the_curve_says(finished):
     project, events = finished
-    (pushed,) = only(solved(project, kind="push", curve=0, force=0.2), "pushed")
+    pushed = push(project, 0.2)
     points = only(events, "curve")[0]["points"]
     expected = next(point["displacement"] for point in points if point["force"] == pytest.approx(0.2))
     assert pushed["point"]["displacement"] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        pytest.param({"link": "diagonal", "place": [20.0, 30.0]}, id="flexible link"),
+        pytest.param({"link": "tip", "place": [10.0, 66.0]}, id="rigid link", marks=pytest.mark.thorough),
+    ],
+)
+def test_the_preview_of_a_push_at_any_point_misses_its_solve_by_the_square_of_the_push(finished, held):
+    project, _ = finished
+    start, missed = push(project, 0.1, held), []
+    for size in (0.04, 0.02):  # N
+        by = np.array([0.6, -0.8]) * size
+        end = push(project, 0.1, held, by)
+        assert end["by"] == by.tolist() and end["point"]["force"] == 0.1
+        wanted, linear, before = (every(own) for own in (end["point"], start["rates"], start["point"]))
+        moved = np.array([by[0] * along + by[1] * across for along, across in zip(*linear, strict=True)])
+        missed.append(np.abs(before + moved - wanted).max())
+        assert missed[-1] < 0.2 * np.abs(wanted - before).max()
+    assert missed[0] / missed[1] == pytest.approx(4.0, rel=0.2)
+
+
+def every(found):
+    """All coordinates of a point, or of each of some rates."""
+    if isinstance(found, list):
+        return [every(own) for own in found]
+    return np.concatenate([np.ravel(own) for own in (*found["nodes"], *found["rigid"], found["pins"])])
 
 
 @pytest.mark.parametrize("aimed", [pytest.param(True, id="with targets"), pytest.param(False, id="without")])
