@@ -59,7 +59,7 @@ Solver to server, a line each, with the number of their task:
                   moves: what follows the parameters in s and the columns of each jacobian: {kind: joint, joints
                   (numbers of those at one place), axis (0: x, 1: y)} or {kind: motor, name};
                   positions: of motors, of each curve
-    pushed    curve, by, point, rates: of the point with the curve's force, or with those of what the pointer holds
+    pushed    curve, at, by, point, rates: of the point with the curve's force, or with those of what the pointer holds
                   along x and y; none where they are not unique
     done      seconds
     cancelled

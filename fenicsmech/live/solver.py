@@ -180,6 +180,7 @@ class Work:
             {
                 "event": "pushed",
                 "curve": number,
+                "at": held,
                 "by": by,
                 "point": {**self._point(frame), "force": task["force"], "displacement": _number(moved)},
                 "rates": [_rates(own) for own in rates],

@@ -6,6 +6,7 @@ Screenshots stay in results/live/.
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import subprocess
@@ -207,12 +208,88 @@ def test_a_joint_that_is_dragged_changes_the_mechanism_and_its_design_follows(pa
     choose(page, "move")
 
 
+def change(page, *path, value):
+    """Sets a value of the project, and waits for what it leads to."""
+    edit = {"kind": "edit", "changes": [{"kind": "set", "path": path, "value": value}], "settled": True}
+    page.run(f"live.send({json.dumps(edit)})")
+    page.until("document.body.dataset.solver === 'idle'")
+    page.settled()
+
+
+PREVIEWED = """
+    const own = live.store.base().curves[0], s = live.store.previewed;
+    const row = own.jacobian.at(-1);
+    return own.values.at(-1) + row.reduce((sum, slope, k) => sum + slope * s[k], 0);
+"""
+END = "return live.store.curves[0].points.at(-1).displacement"
+
+
+def test_the_preview_of_a_joint_that_is_dragged_leads_where_the_solve_does(page):
+    change(page, "fit", value=False)
+    choose(page, "shape")
+    page.until("document.querySelectorAll('.handle.joint').length === 4")
+    page.run("window.first = live.store.linear")
+    before, found = page.run(END), []
+
+    def during():
+        found.append(page.run(PREVIEWED))
+        found.append(page.run("return document.querySelectorAll('#chart .preview, #view .preview').length"))
+        page.picture("joint-preview")
+
+    page.drag(page.chrome.find_elements(By.CSS_SELECTOR, ".handle.joint")[3], 4, 0, steps=4, during=during)
+    page.until("live.store.project.joints[3].at[0] > 40 && document.body.dataset.solver === 'idle'")
+    page.settled()
+    after = page.run(END)
+    assert found[1] >= 2 and abs(after - before) > 0.05
+    assert found[0] - before == pytest.approx(after - before, rel=0.2)
+    line = page.run("return live.store.project.links[4].shape.line")
+    assert line[2] == page.run("return live.store.project.joints[5].at") and 18.0 < line[1][0] < line[2][0] - 22.0
+    page.chrome.find_element(By.ID, "reset").click()
+    page.until("live.store.project.joints[3].at[0] === 40 && live.store.project.fit")
+    page.settled()
+    choose(page, "move")
+
+
+def test_the_preview_of_a_push_at_a_point_leads_where_the_solve_does(page):
+    page.run("document.getElementById('play').click(); live.store.load = 0.5; live.store.show()")
+    view = page.chrome.find_element(By.ID, "view")
+    x, y = page.run("""
+        const { view, store } = live, tip = store.drawnMesh().rigid.findIndex((own) => own.name === "tip");
+        const [a, b] = view.now.rigid[tip], { width, height } = view.svg.getBoundingClientRect();
+        const [across, up] = [0, 1].map((k) => view.scale * (a[k] + b[k]) / 2);
+        return [view.origin[0] + across - width / 2, view.origin[1] - up - height / 2];
+    """)
+    hand = ActionChains(page.chrome, duration=0).move_to_element_with_offset(view, round(x), round(y))
+    hand.click_and_hold().perform()
+    page.until("live.handles.pushed.from && live.handles.pushed.asked === null", 20)
+    assert page.run("return live.handles.pushed.held.at.link") == "tip"
+    page.run("window.first = live.handles.pushed.from; live.store.leans = 0")
+    for _ in range(8):
+        ActionChains(page.chrome, duration=10).move_by_offset(0, 1).perform()
+    ActionChains(page.chrome).pause(0.3).perform()
+    page.until("live.handles.pushed.asked === null && live.handles.pushed.from !== first", 20)
+    assert page.run("return live.store.leans") >= 4
+    assert page.run("return document.querySelectorAll('#view .preview').length") == 1
+    page.picture("pushed-at-a-point")
+    first, now, by = page.run("return [first, live.handles.pushed.from, live.handles.pushed.by]")
+    assert now["by"] == pytest.approx(by, rel=1e-3, abs=1e-6) and by[1] < -0.003
+    before, wanted = (np.concatenate(own["state"]["nodes"]) for own in (first, now))
+    rates = [np.concatenate(own["nodes"]) for own in first["rates"]]
+    missed = before + by[0] * rates[0] + by[1] * rates[1] - wanted
+    assert np.abs(missed).max() < 0.1 * np.abs(wanted - before).max()
+    ActionChains(page.chrome).release().perform()
+    page.until("!live.store.pushed && !live.store.leaning")
+    page.run("document.getElementById('play').click()")
+
+
 def test_a_push_beyond_the_curve_is_solved(page):
     view = page.chrome.find_element(By.ID, "view")
-    ActionChains(page.chrome, duration=0).move_to_element(view).click_and_hold().perform()
+    corner = [round(-0.47 * view.rect[side]) for side in ("width", "height")]
+    hand = ActionChains(page.chrome, duration=0).move_to_element_with_offset(view, *corner)
+    hand.click_and_hold().perform()
     for _ in range(15):
         ActionChains(page.chrome, duration=10).move_by_offset(14, 0).perform()
-    page.until("live.store.pushed && live.store.pushed.force > 0.41")
+    page.until("live.store.leaning && live.store.pushed && live.store.pushed.force > 0.41")
     page.picture("pushed")
     assert page.run("return live.store.pushed.displacement") > page.run(
         "return live.store.curves[0].points.at(-1).displacement"
@@ -393,6 +470,10 @@ def test_the_slider_of_a_motor_is_the_same_while_it_is_dragged(motor_page):
 
     def during():
         page.until("Object.values(live.store.project.curves[live.store.shown].positions).some(at => at)")
+        page.until(
+            "document.querySelectorAll('#chart .preview').length && document.querySelectorAll('#view .preview').length"
+        )
+        page.picture("motor-preview")
         seen.append(page.run("return document.activeElement.matches('#side input[type=range]')"))
 
     page.drag(slider, 20, 0, steps=8, during=during)

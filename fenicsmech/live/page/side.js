@@ -57,8 +57,8 @@ export class Side {
       const move = (value, settled) => set(["curves", n, "positions"], { ...this.store.project.curves[n].positions, [motor.name]: value }, { settled });
       const turn = (settled) => move(Number(slide.value), settled);
       let pending = null; // fewer messages than the server takes
-      slide.oninput = () => { pending ??= setTimeout(() => { pending = null; turn(false); }, 40); };
-      slide.onchange = () => { clearTimeout(pending); pending = null; turn(true); };
+      slide.oninput = () => { this.store.turnTo(motor.name, Number(slide.value)); pending ??= setTimeout(() => { pending = null; turn(false); }, 40); };
+      slide.onchange = () => { clearTimeout(pending); pending = null; this.store.stopTurning(); turn(true); };
       slide.onpointerup = () => slide.blur(); // keys go on with it
       loads.push(this.row(motor.name, slide), this.number(`${motor.name} [${unit}]`, at, (value) => move(value, true)));
     });
