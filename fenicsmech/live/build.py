@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from fenicsmech.design import DesignProblem, HandlePlacement, SplineDesign, Target
 from fenicsmech.effects import Gravity, JointSpring, Temperature
 from fenicsmech.equilibrium import EquilibriumMethod
-from fenicsmech.live.project import PAPER_NAMES, Project, forces_of
+from fenicsmech.laws import NeoHookean
+from fenicsmech.live.project import PAPER_NAMES, Project, forces_of, materials
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -174,6 +176,17 @@ def material_of(own: str | Mapping[str, Any]) -> Material:
         return Material(own["name"], own["E"], own["nu"], density=own["density"])
     name = own
     return _PAPER[PAPER_NAMES[name]] if name in PAPER_NAMES else material(name)
+
+
+@cache
+def constants() -> dict[str, dict[str, float | None]]:
+    """Those of the materials by their names, from which one of its own may start; of neo-Hookean ones."""
+    laws = ((name, own.law, own.density) for name in materials() for own in [material_of(name)])
+    return {
+        name: {"E": law.E, "nu": law.nu, "density": density}
+        for name, law, density in laws
+        if isinstance(law, NeoHookean)
+    }
 
 
 def _shape(own: Mapping[str, Any]) -> Shape:

@@ -23,7 +23,7 @@ Server to page, each with ``heard``, how many messages of the page came before: 
 last edit knows nothing of it. ``event`` is one of
 
     project     project, undo and redo (whether there are steps), opened (how many projects were), examples, materials,
-                    most: {curves, targets}
+                    constants: {material: {E, nu, density}}, most: {curves, targets}
     first       curves of the project as it was opened: [{force, positions, others, points: [[displacement, force]]}]
     solver      state: starting, ready, busy, idle, restarted or failed; since: seconds
     refused     place, problem: of the last message, which changed nothing

@@ -24,6 +24,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from fenicsmech.errors import DescriptionError
+from fenicsmech.live.build import constants
 from fenicsmech.live.job import Job, events
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
 from fenicsmech.live.project import MOST_CURVES, MOST_TARGETS, Project, example_names, materials
@@ -365,6 +366,7 @@ class Server:
             "opened": self.session.opened,
             "examples": example_names(),
             "materials": materials(),
+            "constants": constants(),
             "most": {"curves": MOST_CURVES, "targets": MOST_TARGETS},
         }
 

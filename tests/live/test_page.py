@@ -26,6 +26,7 @@ from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.actions.pointer_input import PointerInput
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 
 from fenicsmech.live import Server, ServerOptions, example
 
@@ -438,6 +439,70 @@ def test_a_curve_of_a_new_force_is_added_dragged_and_removed(page):
     choose(page, "move")
 
 
+def field(page, name):
+    """The last field of that name beside the pictures."""
+    rows = [own for own in page.chrome.find_elements(By.CSS_SELECTOR, "#side label") if own.text.split("\n")[0] == name]
+    return rows[-1].find_element(By.CSS_SELECTOR, "input, select")
+
+
+def enter(page, name, value):
+    """Gives a number to a field."""
+    found = field(page, name)
+    found.clear()
+    found.send_keys(str(value), Keys.ENTER)
+
+
+def pick(page, name, text):
+    """Chooses from a list."""
+    Select(field(page, name)).select_by_visible_text(text)
+
+
+def test_materials_springs_model_and_constant_forces_are_changed_beside_the_pictures(page):
+    before = page.run("return live.store.curves[0].points[1].displacement")
+    change(page, "fit", value=False)
+    pick(page, "material", "numbers of its own…")
+    page.until("live.store.project.links[4].material.E === 1.9", 20)
+    page.until("document.querySelector('#side').innerText.includes('E [MPa]')", 20)
+    enter(page, "E [MPa]", 2.5)
+    page.until("live.store.project.links[4].material.E === 2.5", 20)
+    page.settled()
+    assert page.run("return live.store.curves[0].points[1].displacement") < 0.95 * before
+    enter(page, "ν", 0.6)
+    page.until("document.getElementById('told').innerText.includes('nu: not between')", 20)
+    assert page.run("return live.store.project.links[4].material.nu") == 0.475
+    enter(page, "[N mm/rad]", 50)
+    page.until("live.store.project.effects.some((own) => own.stiffness === 50)", 20)
+    pick(page, "model", "plane strain")
+    page.until("live.store.project.simulation.space === 'plane-strain'", 20)
+    page.chrome.find_element(By.ID, "add-force").click()
+    page.until("live.store.project.curves[0].others['force 2'] === 0.04", 20)
+    page.settled()
+    page.picture("constant-force")
+    enter(page, "constant [N]", 0)
+    page.until("!('force 2' in live.store.project.curves[0].others)", 20)
+    page.until("document.querySelector('#side').innerText.includes('Remove force 2')", 20)  # the fields are made anew
+    page.settled()
+    field(page, "changes shape").click()
+    page.until("live.store.project.links[4].design === null && document.body.dataset.solver === 'idle'")
+    page.chrome.find_element(By.ID, "reset").click()
+    page.until("live.store.project.fit && live.store.project.forces.length === 1")
+    page.settled()
+
+
+def test_a_curve_takes_another_force_and_its_own_is_removed_with_it(page):
+    page.chrome.find_element(By.ID, "add-curve").click()
+    page.until("live.store.project.curves.length === 2 && live.store.shown === 1", 20)
+    pick(page, "force", "push on tip")
+    page.until("live.store.project.curves[1].force === 'push on tip' && live.store.project.forces.length === 1", 20)
+    page.settled()
+    page.until("live.store.curves[1] && live.store.curves[1].iterate === null")
+    ends = page.run("return [0, 1].map((k) => live.store.curves[k].points.at(-1).displacement)")
+    assert ends[1] == pytest.approx(ends[0], rel=1e-4)
+    page.chrome.find_element(By.ID, "reset").click()
+    page.settled()
+    choose(page, "move")
+
+
 def test_the_button_for_curves_rests_at_the_last_that_a_project_may_have(page):
     add = page.chrome.find_element(By.ID, "add-curve")
     for count in (2, 3, 4):
@@ -488,6 +553,20 @@ def test_the_slider_of_a_motor_is_the_same_while_it_is_dragged(motor_page):
     page.until("Object.values(live.store.project.curves[live.store.shown].positions).includes(0.3)")
     page.settled()
     assert page.run("return live.store.curve().points.at(-1).displacement") != before
+
+
+def test_a_curve_of_the_same_force_is_added_with_the_motor_elsewhere(motor_page):
+    page = motor_page
+    count = page.run("return live.store.project.curves.length")
+    page.chrome.find_element(By.ID, "add-position").click()
+    page.until(f"live.store.project.curves.length === {count + 1} && live.store.shown === {count}", 20)
+    page.until(f"live.store.curves[{count}] && live.store.curves[{count}].iterate === null")
+    first, added = page.run("return [live.store.project.curves[0], live.store.project.curves.at(-1)]")
+    assert first["force"] == added["force"] and page.run("return live.store.project.forces.length") == 1
+    (motor,) = added["positions"]
+    assert added["positions"][motor] == pytest.approx(first["positions"].get(motor, 0.0) + 0.2)
+    page.settled()
+    page.picture("position")
 
 
 def test_the_finger_becomes_a_fifth_stiffer_by_one_button(page):

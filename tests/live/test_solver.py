@@ -109,6 +109,72 @@ def test_the_linear_preview_of_a_motor_is_that_of_the_mechanism_turned():
     assert every(rates) == pytest.approx(rate, abs=0.01 * np.abs(rate).max())
 
 
+def drawn(project):
+    """The project with its links as drawn."""
+    return edited(project, [{"kind": "set", "path": ["design"], "value": None}])
+
+
+@pytest.mark.thorough
+def test_a_material_of_its_own_of_twice_the_modulus_bears_twice_the_force(finished):
+    soft = drawn(finished[0])
+    own = {"name": "own", "E": 3.8, "nu": 0.475, "density": None}  # that of the example has 1.9
+    changes = [
+        {"kind": "set", "path": ["links", 4, "material"], "value": own},
+        {"kind": "set", "path": ["curves", 0, "largest"], "value": 2 * soft["curves"][0]["largest"]},
+        *({"kind": "set", "path": ["targets", k, "force"], "value": force} for k, force in enumerate((0.2, 0.8))),
+    ]
+    assert displacements(edited(soft, changes)) == pytest.approx(displacements(soft), rel=1e-5)
+
+
+@pytest.mark.thorough
+def test_plane_strain_is_stiffer_than_plane_stress_as_plates_are_than_beams(finished):
+    project = edited(drawn(finished[0]), [{"kind": "set", "path": ["curves", 0, "largest"], "value": 0.002}])
+    order = {"kind": "set", "path": ["simulation", "order"], "value": 2}  # the first is too stiff in bending
+    project = edited(project, [*[{"kind": "remove", "path": ["targets", 0]}] * 2, order])
+    strain = edited(project, [{"kind": "set", "path": ["simulation", "space"], "value": "plane-strain"}])
+    nu = 0.475
+    assert displacements(project) / displacements(strain) == pytest.approx(1.0 / (1.0 - nu**2), rel=0.03)
+
+
+@pytest.mark.thorough
+def test_a_spring_of_a_joint_bears_its_part_of_the_force(finished):
+    project, stiffness, height = drawn(finished[0]), 200.0, 60.0  # N mm/rad, mm
+    spring = {"kind": "joint spring", "joint": "foot of left leg", "stiffness": stiffness, "rest": 0.0}
+    sprung = edited(project, [{"kind": "insert", "path": ["effects", 0], "value": spring}])
+    (bare,), (held,) = (only(solved(own), "curve") for own in (project, sprung))
+    for point in held["points"][1:]:
+        angle = np.arcsin(point["displacement"] / height)  # of the legs: work k φ dφ = F du, u = h sin φ
+        share = stiffness * angle / (height * np.cos(angle))
+        alone = solved(project, kind="push", curve=0, force=point["force"] - share, at=None, by=[0.0, 0.0])
+        assert only(alone, "pushed")[0]["point"]["displacement"] == pytest.approx(point["displacement"], rel=1e-4)
+    assert held["points"][-1]["displacement"] < 0.95 * bare["points"][-1]["displacement"]
+
+
+@pytest.mark.thorough
+def test_a_constant_force_along_that_of_a_curve_adds_to_it(finished):
+    project = drawn(finished[0])
+    other = {"name": "constant", "on": "tip", "at": [5, 62], "direction": [1, 0]}
+    changes = [
+        {"kind": "insert", "path": ["forces", 1], "value": other},
+        {"kind": "set", "path": ["curves", 0, "others"], "value": {"constant": 0.1}},
+    ]
+    (curve,) = only(solved(edited(project, changes)), "curve")
+    for point in curve["points"]:
+        alone = push(project, point["force"] + 0.1)["point"]
+        assert point["displacement"] == pytest.approx(alone["displacement"], rel=1e-5)  # the tip is not turned
+
+
+@pytest.mark.thorough
+def test_links_that_keep_their_shape_have_no_parameters_and_those_that_change_it_as_many_as_their_segments_need(
+    finished,
+):
+    project, found = drawn(finished[0]), []
+    for design in (None, {"segments": 2, "thickness": None}, {"segments": 3, "thickness": None}):
+        own = edited(project, [{"kind": "set", "path": ["links", 4, "design"], "value": design}])
+        found.append([len(event["lengths"]) for event in only(solved(own), "linear")])
+    assert found == [[], [12], [18]]
+
+
 @pytest.mark.thorough
 def test_a_new_gesture_ends_an_optimisation_at_its_next_iterate(finished):
     project, _ = finished

@@ -72,13 +72,14 @@ const store = {
   },
   send(message) { return send(message); },
   tell(text, error) { tell(text, error); },
+  fresh,
   show() { show(); },
   drawCurve() { chart.preview(); },
   listTargets() { listTargets(); },
 };
 
 const HINTS = {
-  move: "Drag a target ◆ on the curve, or choose Stiffer: the link changes its shape to follow. Or push the mechanism at any point.",
+  move: "Drag a target ◆ on the curve, or choose Stiffer: the link changes its shape to follow. Or push it anywhere.",
   solid: "Turn the solid with the pointer or the arrow keys. Solve in 3D to see how far plane stress is from it.",
   shape: "Drag joints ●, control points ■, slopes ○ and thicknesses ◆: the dashed curve shows where it leads. The force ▲ is solved where it rests.",
 };
@@ -102,7 +103,8 @@ const receivers = {
     if (store.forces !== forces) { store.forces = forces; store.linear = null; if (!store.turning) store.previewed = null; }
     for (const number of Object.keys(store.curves)) if (number >= project.curves.length) delete store.curves[number];
     $("name").textContent = project.name;
-    $("add-curve").disabled = project.curves.length >= store.most.curves;
+    $("add-curve").disabled = $("add-position").disabled = project.curves.length >= store.most.curves;
+    $("add-position").hidden = !project.motors.length;
     $("add").disabled = project.targets.length >= store.most.targets;
     $("undo").disabled = !undo; $("redo").disabled = !redo;
     tabs(); listTargets(); chart.draw(); side.draw();
@@ -322,10 +324,23 @@ const share = () => Math.min(Math.max(Number($("by").value) || 20, 1), 90) / 100
 $("stiffer").onclick = () => stiffen(1 + share());
 $("softer").onclick = () => stiffen(1 - share());
 
+// A name that none of some parts has.
+function fresh(stem, taken) {
+  let k = taken.length + 1;
+  while (taken.some((own) => own.name === `${stem} ${k}`)) k++;
+  return `${stem} ${k}`;
+}
+
+// A curve of the shown one's force, with the motors elsewhere.
+$("add-position").onclick = () => {
+  const { curves, motors, joints } = store.project, shown = curves[store.shown], [motor] = motors, name = fresh("curve", curves);
+  const by = joints.find((own) => own.name === motor.joint).kind === "prismatic" ? 1 : 0.2, positions = { ...shown.positions, [motor.name]: Number(((shown.positions[motor.name] || 0) + by).toFixed(4)) };
+  store.added = name;
+  store.edit([{ kind: "insert", path: ["curves", curves.length], value: { ...shown, name, positions } }]);
+};
 // A curve like the shown one, of a force of its own, turned by 45°: its point and direction are dragged in Shape.
 $("add-curve").onclick = () => {
   const { curves, forces } = store.project, shown = curves[store.shown], like = forces.find((own) => own.name === shown.force);
-  const fresh = (stem, taken) => { let k = taken.length + 1; while (taken.some((own) => own.name === `${stem} ${k}`)) k++; return `${stem} ${k}`; };
   const name = fresh("force", forces), curve = fresh("curve", curves), [a, b] = like.direction;
   store.added = curve; // it is shown when the server has it
   store.edit([{ kind: "insert", path: ["forces", forces.length], value: { ...like, name, direction: [0.7 * (a - b), 0.7 * (a + b)].map((part) => Number(part.toFixed(4))) } },
