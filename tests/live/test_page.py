@@ -470,7 +470,7 @@ def test_materials_springs_model_and_constant_forces_are_changed_beside_the_pict
     enter(page, "ν", 0.6)
     page.until("document.getElementById('told').innerText.includes('nu: not between')", 20)
     assert page.run("return live.store.project.links[4].material.nu") == 0.475
-    enter(page, "[N mm/rad]", 50)
+    enter(page, "stiffness [N mm]", 50)
     page.until("live.store.project.effects.some((own) => own.stiffness === 50)", 20)
     pick(page, "model", "plane strain")
     page.until("live.store.project.simulation.space === 'plane-strain'", 20)

@@ -184,7 +184,7 @@ export class Side {
       if (stiffness === 0) { if (k >= 0) this.store.edit([{ kind: "remove", path: ["effects", k] }]); }
       else this.store.edit([k < 0 ? { kind: "insert", path: ["effects", effects.length], value } : { kind: "set", path: ["effects", k], value }]);
     };
-    const [force, position] = joint.kind === "prismatic" ? ["N/mm", "mm"] : ["N mm/rad", "rad"], fields = [this.row("at", chosen), this.number(`[${force}]`, now.stiffness, (value) => spring(value, now.rest))];
+    const [force, position] = joint.kind === "prismatic" ? ["N/mm", "mm"] : ["N mm", "rad"], fields = [this.row("joint", chosen), this.number(`stiffness [${force}]`, now.stiffness, (value) => spring(value, now.rest))];
     return k < 0 ? fields : [...fields, this.number(`relaxed at [${position}]`, now.rest, (value) => spring(now.stiffness, value))];
   }
 

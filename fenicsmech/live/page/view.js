@@ -168,8 +168,10 @@ export class View {
     if (!pushed || !pushed.held) return [];
     const { held, by } = pushed, [x, y] = held.node === undefined ? shared(rigid[held.rigid], held.shares) : nodes[held.flexible][held.node];
     const largest = Math.abs(this.store.project.curves[this.store.shown].largest), size = 70 / this.scale / largest;
-    return [make("path", { class: "pull", d: path([[x, y], [x + size * by[0], y + size * by[1]]]), "stroke-width": 3 / this.scale }),
-      make("circle", { class: "pull-point", cx: x, cy: y, r: 5 / this.scale })];
+    const long = size * Math.hypot(...by), head = Math.min(9 / this.scale, 0.6 * long), [a, b] = by.map((part) => part * size / (long || 1)), [tipX, tipY] = [x + long * a, y + long * b];
+    const wings = [1, -1].map((side) => [tipX - head * (1.4 * a + 0.6 * side * b), tipY - head * (1.4 * b - 0.6 * side * a)]);
+    return [make("path", { class: "pull", d: path([[x, y], [tipX - head * a, tipY - head * b]]), "stroke-width": 3 / this.scale }),
+      make("path", { class: "pull-point", d: path([[tipX, tipY], ...wings], true) }), make("circle", { class: "pull-point", cx: x, cy: y, r: 5 / this.scale })];
   }
 }
 
