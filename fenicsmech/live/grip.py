@@ -10,7 +10,7 @@ import numpy as np
 from fenicsmech.equilibrium import LoadControl
 from fenicsmech.live.responses import outlines
 from fenicsmech.mechanism import FlexibleLink, Force, Link
-from fenicsmech.simulation import CurveRequest, Frame, MechanismPlotter, Simulation
+from fenicsmech.simulation import Curve, CurveRequest, Frame, MechanismPlotter, Simulation
 
 
 class Grip:
@@ -19,19 +19,20 @@ class Grip:
     Args:
         simulation: of the mechanism, to which the forces do not belong.
         plotter: that draws it.
-        frame: in which the point is held.
+        start: the curve in whose last frame the point is held.
         link: that the point is on.
-        place: where the point is in the frame, or the place that is nearest to it.
+        place: where the point is in the frame, or a place that it is nearest to.
 
     Attributes:
+        start: as given.
         forces: along x and y.
     """
 
     def __init__(
-        self, simulation: Simulation, plotter: MechanismPlotter, frame: Frame, link: Link, place: Sequence[float]
+        self, simulation: Simulation, plotter: MechanismPlotter, start: Curve, link: Link, place: Sequence[float]
     ) -> None:
-        self._simulation = simulation
-        at = _drawn(simulation, plotter, frame, link, np.array(place))
+        self._simulation, self.start = simulation, start
+        at = _drawn(simulation, plotter, start.frames[-1], link, np.array(place))
         along, across = (
             Force(link, at, way, f"push along {axis}") for axis, way in (("x", (1.0, 0.0)), ("y", (0.0, 1.0)))
         )
@@ -39,8 +40,6 @@ class Grip:
 
     def pulled(self, request: CurveRequest, by: Sequence[float]) -> CurveRequest:
         """The request of an equilibrium on a curve with a force ``by`` (2,) at the point."""
-        if not any(by):
-            return request
         (control,), (along, across) = request.controls, self.forces
         others = (*request.others, (request.part, control.prescribed), (across, by[1]))
         return CurveRequest(along, (LoadControl(by[0]),), request.configuration, others)  # type: ignore[arg-type]

@@ -163,17 +163,19 @@ class Work:
         request, held, by = self._drawing.request(self._project, number, [task["force"]]), task["at"], task["by"]
         part = self._drawing.forces[self._project["curves"][number]["force"]]
         forces: Sequence[Force] = [part]
-        if held is not None:
+        if held is None:
+            curve = simulation.compute(request)
+        else:
 
             def grip() -> Grip:
-                start = simulation.compute(request).frames[-1]
-                return Grip(simulation, self._plotter, start, self._drawing.links[held["link"]], held["place"])
+                link, start = self._drawing.links[held["link"]], simulation.compute(request)
+                return Grip(simulation, self._plotter, start, link, held["place"])
 
             own = self._solver.grip(json.dumps([self._project, number, task["force"], held]), grip)
-            request, forces = own.pulled(request, by), own.forces
-        curve = simulation.compute(request)
+            curve = simulation.compute(own.pulled(request, by)) if any(by) else own.start
+            forces = own.forces
         frame, model = curve.frames[-1], simulation.model
-        solver = simulation.solver(request.part, [force for force, _ in request.others])
+        solver = simulation.solver(curve.part, [force for force, _ in curve.others])
         rates = responses(model, self._plotter, solver, frame, [by_force(model, force) for force in forces])
         moved = displacement(model, part, frame, curve.unloaded)
         self._emit(

@@ -287,7 +287,13 @@ export class Handles {
     }
     if (pushed.pending) return;
     pushed.pending = true;
-    requestAnimationFrame(() => { pushed.pending = false; if (this.pushed === pushed) { store.leans += 1; store.show(); } });
+    requestAnimationFrame(() => {
+      pushed.pending = false;
+      if (this.pushed !== pushed) return;
+      store.leans += 1;
+      if (store.pushed !== this.view.now) { store.show(); return; }
+      this.view.preview(); store.showState(); // the state is drawn
+    });
   }
 
   // The solver is asked for one push at a time.

@@ -74,6 +74,7 @@ const store = {
   tell(text, error) { tell(text, error); },
   fresh,
   show() { show(); },
+  showState() { showState(); },
   drawCurve() { chart.preview(); },
   listTargets() { listTargets(); },
 };
@@ -377,10 +378,15 @@ function showPlaying() {
 function show() {
   if (store.mode === "solid") solid.draw(); else view.draw();
   chart.mark(store.load);
-  const state = store.mode === "solid" ? solid.now : view.now;
   compareSolid();
+  showState();
+}
+
+// The load of what is drawn.
+function showState() {
+  const state = store.mode === "solid" ? solid.now : view.now, held = handles.pushed && handles.pushed.held;
   if (!state) return;
-  const pull = handles.pushed && handles.pushed.held ? `, pushed by ${figure(Math.hypot(...handles.pushed.by), 2)} N` : "";
+  const pull = held ? `, pushed by ${figure(Math.hypot(...handles.pushed.by), 2)} N` : "";
   $("at").textContent = `${figure(state.force, 2)} N, ${figure(state.displacement, 3)} mm${pull}`;
 }
 
