@@ -368,7 +368,10 @@ def test_keys_move_add_and_remove_targets_joints_and_pushes(page):
     page.chrome.switch_to.active_element.send_keys(Keys.ARROW_UP)
     page.until("live.store.project.forces[0].at[1] > 70")
     page.until("document.activeElement.matches('.handle.force')", 20)  # keys go on with it
-    assert all(own.get_attribute("aria-label") for own in page.chrome.find_elements(By.CSS_SELECTOR, "[tabindex='0']"))
+    labelled = (
+        "return [...document.querySelectorAll('[tabindex=\"0\"]')].every((own) => own.getAttribute('aria-label'))"
+    )
+    assert page.run(labelled)
     page.chrome.find_element(By.ID, "undo").click()
     page.until("live.store.project.forces[0].at[1] === 70")
     page.settled()
