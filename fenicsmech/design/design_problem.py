@@ -155,6 +155,8 @@ class DesignProblem:
         """
         own, rest, model = self._own, self._own.rest, self.simulation.model
         parameters, near = own.given(design)
+        wider = own.with_numbers(numbers) if numbers else own
+        every = wider.rest
         with model.shaped(model.design):
             placement = rest.place(parameters, near)
             try:
@@ -164,8 +166,7 @@ class DesignProblem:
                     f"design of {self.simulation.scene.mechanism.name!r}", str(failure), "Give smaller loads"
                 ) from failure
             own.loaded.keep(solved)
-            wider = own.with_numbers(numbers) if numbers else own
-            every, count = wider.rest, len(placement.p)
+            count = len(placement.p)
             slopes = every.slopes(every.widened(placement), wider.loaded.gradients(solved))
             return DesignLinearisation(
                 placement=placement,

@@ -17,7 +17,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from fenicsmech.design import DesignIterate, DesignProblem, HandlePlacement, LevenbergMarquardt
+from fenicsmech.design import DesignIterate, DesignLinearisation, DesignProblem, HandlePlacement, LevenbergMarquardt
 from fenicsmech.equilibrium import PrimalDualNewton
 from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
 from fenicsmech.live.build import Drawing, draw, placement
@@ -28,6 +28,7 @@ from fenicsmech.live.responses import Outlines, by_force, by_motor, displacement
 from fenicsmech.mechanism import Force
 from fenicsmech.plot import MechanismShape
 from fenicsmech.polygons import edge_loops
+from fenicsmech.quantities import NumberKind
 from fenicsmech.simulation import Curve, Frame, MechanismPlotter, Simulation, gather
 from fenicsmech.stress import von_mises
 
@@ -273,13 +274,8 @@ class Work:
             along = self._drawing.along_curves(self._project, reached) if all(reached) else None
             if along is None:
                 return
-        start, movable = along.initial if at is None else at, self._drawing.movable(self._project)
         try:
-            try:
-                found = along.linearise(start, numbers=[kind for _, kind in movable])
-            except DescriptionError:  # a link that cannot follow its joints
-                movable = []
-                found = along.linearise(start)
+            movable, found = self._with_moves(along, along.initial if at is None else at)
         except EquilibriumError:
             return  # the curve that ends early is told already
         self._solver.check()
@@ -317,6 +313,18 @@ class Work:
                 ],
             }
         )
+
+    def _with_moves(
+        self, along: DesignProblem, at: HandlePlacement | np.ndarray
+    ) -> tuple[list[tuple[dict[str, Any], NumberKind]], DesignLinearisation]:
+        """The derivatives at a design, and what they are taken by beside it: motors alone where links cannot follow."""
+        movable = self._drawing.movable(self._project)
+        for own in (movable, [(name, kind) for name, kind in movable if name["kind"] == "motor"]):
+            try:
+                return own, along.linearise(at, numbers=[kind for _, kind in own])
+            except DescriptionError:
+                continue
+        return [], along.linearise(at)
 
     def _point(self, frame: Frame) -> dict[str, Any]:
         """A frame as the page draws it, its mesh sent once before."""

@@ -59,7 +59,9 @@ def test_the_linear_preview_is_the_derivative_of_the_curve(finished):
         at = edited(project, [{"kind": "set", "path": ["design", "offsets"], "value": offsets}])
         moved.append([point["displacement"] for point in only(solved(at), "curve")[0]["points"][1:]])
     change = 0.5 * (np.array(moved[1]) - moved[0])
-    assert np.array(own["jacobian"]) @ step == pytest.approx(change, rel=0.02, abs=0.02 * np.abs(change).max())
+    assert np.array(own["jacobian"])[:, : len(step)] @ step == pytest.approx(
+        change, rel=0.02, abs=0.02 * np.abs(change).max()
+    )
 
 
 def displacements(project):
