@@ -59,7 +59,7 @@ const look = () => {
 };
 look();
 watch.move = (handle, x, y, seconds) => new Promise((resolve) => {
-  const began = now(), before = live.chart.frames, gaps = [];
+  const count = () => live.chart.frames + live.store.leans, began = now(), before = count(), gaps = [];
   let last = began;
   const frame = (time) => {
     gaps.push(time - last);
@@ -68,10 +68,20 @@ watch.move = (handle, x, y, seconds) => new Promise((resolve) => {
     const pointerId = watch.pointer;
     handle.dispatchEvent(new PointerEvent("pointermove", { pointerId, clientX, clientY: y, bubbles: true }));
     if (now() - began < 1000 * seconds) requestAnimationFrame(frame);
-    else resolve([(live.chart.frames - before) / (now() - began) * 1000, Math.max(...gaps.slice(1))]);
+    else resolve([(count() - before) / (now() - began) * 1000, Math.max(...gaps.slice(1))]);
   };
   requestAnimationFrame(frame);
 });
+"""
+
+# a node in the middle of the link, from the middle of the picture and of the window
+MIDDLE = """
+const { view } = live, nodes = view.now.nodes[0], box = view.svg.getBoundingClientRect();
+const middle = nodes.reduce((sum, node) => sum + node[1], 0) / nodes.length;
+const apart = (node) => Math.abs(node[1] - middle);
+const node = nodes.reduce((best, node) => apart(node) < apart(best) ? node : best);
+const [x, y] = [view.origin[0] + view.scale * node[0], view.origin[1] - view.scale * node[1]];
+return [x - box.width / 2, y - box.height / 2, box.x + x, box.y + y].map(Math.round);
 """
 
 
@@ -227,6 +237,37 @@ def drags(frames: Frames, count: int) -> list[tuple]:
     ]
 
 
+def pushes(frames: Frames, count: int) -> list[tuple]:
+    """Pushes of the middle of the link in the browser: its response, and previews while the solver follows."""
+    held, rates, gaps = [], [], []
+    with running() as page, browsing() as browser:
+        browser.get(page.address)
+        until(browser, SETTLED)
+        browser.execute_script(WATCH)
+        browser.find_element(By.ID, "play").click()
+        view = browser.find_element(By.ID, "view")
+        for k in range(count):
+            frame = frames.seconds()
+            browser.execute_script("live.store.load = arguments[0]; live.store.show()", 0.2 + 0.5 * k / count)
+            across, down, x, y = browser.execute_script(MIDDLE)
+            ActionChains(browser, duration=0).move_to_element_with_offset(view, across, down).click_and_hold().perform()
+            began = perf_counter()
+            until(browser, "live.handles.pushed.held && live.handles.pushed.from")
+            held.append((perf_counter() - began, frame))
+            rate, gap = browser.execute_script(
+                "return window.watch.move(arguments[0], arguments[1], arguments[2], 2)", view, x, y
+            )
+            rates.append((rate, None))
+            gaps.append((gap, None))
+            ActionChains(browser).release().perform()
+            until(browser, SETTLED)
+    return [
+        _line("taking hold of a link to its linear response", held, "s"),
+        _line("previews drawn during a push", rates, "1/s", wanted="≥ 30 / s", worst=min),
+        _line("longest gap between two frames of the screen in a push", gaps, "ms"),
+    ]
+
+
 async def _edit(page, displacement: float) -> None:
     change = {"kind": "set", "path": ["targets", 1, "displacement"], "value": displacement}
     await page.send_str(json.dumps({"kind": "edit", "changes": [change], "settled": True}))
@@ -313,6 +354,7 @@ def main() -> None:
         lambda: [_line("a frame in plane stress", [(1000.0 * frames.seconds(), None) for _ in range(9)], "ms")],
         lambda: starts(frames, options.starts),
         lambda: drags(frames, options.drags),
+        lambda: pushes(frames, options.drags),
         lambda: cancels(frames, options.cancels),
         lambda: memory(options.gestures),
     ):

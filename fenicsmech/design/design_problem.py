@@ -43,7 +43,7 @@ from fenicsmech.mechanism import FlexibleLink, Joint
 from fenicsmech.meshing import LinkMesh
 from fenicsmech.model import Design
 from fenicsmech.multibody import JointChange, build_linkage
-from fenicsmech.quantities import joint_changes
+from fenicsmech.quantities import NumberKind, joint_changes
 from fenicsmech.simulation import Simulation, joint_points
 
 _log = logger(__name__)
@@ -65,10 +65,13 @@ class DesignLinearisation:
         values: Q, (components,).
         errors: e, estimated discretisation errors, to be added, (components,).
         jacobian: J, (components, parameters).
+        by_numbers: ∂Q/∂v of further numbers v, held as drawn, (components, numbers).
         regulariser: R.
         active: the bounds that hold the design back, in words.
         entries: the parameter that each component of each link's control points is, −1 where it is none, as
             ``LinkDesign.controls``.
+        controls_by_numbers: how control points of each link follow joints that the further numbers shift, (points, 2,
+            3, numbers).
     """
 
     placement: HandlePlacement
@@ -77,9 +80,11 @@ class DesignLinearisation:
     values: np.ndarray
     errors: np.ndarray
     jacobian: np.ndarray
+    by_numbers: np.ndarray
     regulariser: Quadratic
     active: tuple[str, ...]
     entries: tuple[np.ndarray, ...]
+    controls_by_numbers: tuple[np.ndarray, ...]
 
 
 class DesignProblem:
@@ -134,16 +139,24 @@ class DesignProblem:
         other._own, other._clock = self._own.with_targets(targets), self._clock
         return other
 
-    def linearise(self, design: DesignResult | HandlePlacement | np.ndarray) -> DesignLinearisation:
+    def linearise(
+        self, design: DesignResult | HandlePlacement | np.ndarray, *, numbers: Sequence[NumberKind] = ()
+    ) -> DesignLinearisation:
         """Values of all targets' quantities at a design, and their derivatives with respect to its parameters.
 
+        Args:
+            design: of this problem.
+            numbers: further ones, held as drawn, by which derivatives are wanted too, from the same adjoints.
+
         Raises:
-            DescriptionError: the design belongs to other links.
+            DescriptionError: the design belongs to other links, or a further number is one that changes.
             ShapeError: cells of the mesh are inverted in this shape, or a number is out of its bounds.
             EquilibriumError: a target's equilibrium is not found, or is unstable.
         """
         own, rest, model = self._own, self._own.rest, self.simulation.model
         parameters, near = own.given(design)
+        wider = own.with_numbers(numbers) if numbers else own
+        every = wider.rest
         with model.shaped(model.design):
             placement = rest.place(parameters, near)
             try:
@@ -153,16 +166,20 @@ class DesignProblem:
                     f"design of {self.simulation.scene.mechanism.name!r}", str(failure), "Give smaller loads"
                 ) from failure
             own.loaded.keep(solved)
+            count = len(placement.p)
+            slopes = every.slopes(every.widened(placement), wider.loaded.gradients(solved))
             return DesignLinearisation(
                 placement=placement,
                 links=link_designs(rest, placement),
                 lengths=rest.lengths,
                 values=own.loaded.values(solved),
                 errors=own.loaded.errors(solved),
-                jacobian=rest.slopes(placement, own.loaded.gradients(solved)),
+                jacobian=slopes[:, :count],
+                by_numbers=slopes[:, count:] / every.numbers.width[len(rest.numbers.numbers) :],
                 regulariser=self.regulariser.around(rest, placement)(parameters),
                 active=self.regulariser.active(rest, placement),
                 entries=tuple(link.entries for link in rest.links),
+                controls_by_numbers=every.control_rates()[: len(rest.links)],
             )
 
     def placement(self, design: DesignResult | HandlePlacement | np.ndarray) -> HandlePlacement:

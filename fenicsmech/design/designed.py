@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fenicsmech.collective import on_all
-from fenicsmech.design.description import SplineDesign, shape_requests, with_followers
+from fenicsmech.design.description import SplineDesign, check_designs, shape_requests, with_followers
 from fenicsmech.design.equilibria import FollowOptions, SampleEquilibria
 from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
@@ -75,12 +75,31 @@ class DesignedSimulation:
             )
         self._requests = shape_requests(self.shapes, simulation, self.numbers)
         self._like: DesignedSimulation | None = None
+        self._narrower: DesignedSimulation | None = None
+        self._wider: dict[tuple[NumberKind, ...], DesignedSimulation] = {}
 
     def with_targets(self, targets: Sequence[Target]) -> DesignedSimulation:
         """The same with other targets, which shares handles, weights and compiled sensitivities."""
         other = DesignedSimulation(self.simulation, self.designs, targets, self._regulariser, self.clock)
-        other._like = self
+        other._like, other._wider = self, self._wider
         return other
+
+    def with_numbers(self, kinds: Sequence[NumberKind]) -> DesignedSimulation:
+        """The same with further numbers, between any bounds; kept for other targets.
+
+        Raises:
+            DescriptionError: the scene has no such number, it changes already, or a link cannot follow it.
+        """
+        key = tuple(kinds)
+        if key not in self._wider:
+            drawn = [kind.shared([kind.described(part) for part in kind.parts]) for kind in kinds]
+            bounds = [sorted((0.5 * value, 2.0 * value)) if value else (-1.0, 1.0) for value in drawn]
+            designs = (*self.designs, *(Number(kind, *own) for kind, own in zip(kinds, bounds, strict=True)))
+            check_designs(designs)
+            wider = DesignedSimulation(self.simulation, designs, self.targets, self._regulariser, self.clock)
+            wider._narrower = self
+            self._wider[key] = wider
+        return self._wider[key].with_targets(self.targets)
 
     def on(self, simulation: Simulation) -> DesignedSimulation:
         """The same in another simulation."""
@@ -131,7 +150,8 @@ class DesignedSimulation:
     @cached_property
     def loaded(self) -> SampleEquilibria:
         """The equilibria of all targets, of all processes together."""
-        like = None if self._like is None else self._like.loaded
+        other = self._like or self._narrower
+        like = None if other is None else other.loaded
         return SampleEquilibria(self.simulation, self.targets, numbers=self._kinds, like=like)
 
     @property

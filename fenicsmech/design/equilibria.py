@@ -182,8 +182,8 @@ class SampleEquilibria:
         targets: whose samples these are.
         options: of following them from design to design.
         numbers: with respect to which derivatives are wanted, in addition to those by the design field.
-        like: those of other targets in the same simulation, with the same numbers; compiled sensitivities and the
-            equilibria kept are shared.
+        like: those of other targets in the same simulation; compiled sensitivities are shared, and with the same
+            numbers the equilibria kept.
     """
 
     def __init__(
@@ -195,8 +195,12 @@ class SampleEquilibria:
         like: SampleEquilibria | None = None,
     ) -> None:
         self._simulation, self._model, self._options = simulation, simulation.model, options or FollowOptions()
-        self.targets = tuple(targets)
-        self._shared: _Shared = like._shared if like else _Shared(Sensitivity(simulation.model, numbers))
+        self.targets, self._numbers = tuple(targets), tuple(numbers)
+        if like is not None and like._numbers == tuple(numbers):
+            self._shared: _Shared = like._shared
+        else:
+            own = Sensitivity(simulation.model, ()) if like is None else like._shared.sensitivity
+            self._shared = _Shared(own.with_numbers(numbers))
         kinds = {target.quantity: target.quantity.on(simulation.model) for target in targets}
         self._observables = [kinds[target.quantity] for target in targets]
         self._at_rest = {k: own for k, own in enumerate(self._observables) if isinstance(own, RestObservable)}

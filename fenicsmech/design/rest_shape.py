@@ -238,6 +238,22 @@ class ParametricShape:
                 raise ShapeError("rest shape", "its curved edges squeeze cells", "Change it by less, or mesh it finer")
         return Design(field.ravel(), self.numbers.values(q))
 
+    def widened(self, placement: HandlePlacement) -> HandlePlacement:
+        """A placement of the same links with fewer numbers, with the others, and links that follow them, as drawn."""
+        p, theta, drawn = placement.p, placement.theta, self._map.initial_theta
+        if len(theta) < len(drawn):
+            drawn = drawn + self._lag
+        return HandlePlacement(np.append(p, self.initial[len(p) :]), np.append(theta, drawn[len(theta) :]))
+
+    def control_rates(self) -> tuple[np.ndarray, ...]:
+        """Derivatives of each link's control points by all numbers that change, (points, 2, 3, numbers)."""
+        found = []
+        for link in self.links:
+            spline, rates = link.spline, np.zeros((link.spline.controls.size, len(self.numbers.numbers)))
+            rates[spline.entries] = link.parameters.matrix[:, self.of_numbers] / self.numbers.width
+            found.append(rates.reshape(*spline.controls.shape, -1))
+        return tuple(found)
+
     def slopes(self, placement: HandlePlacement, gradients: Sequence[Gradient]) -> np.ndarray:
         """dQ/dp of some components at the design placed as in ``placement``, (components, parameters)."""
         fields = np.array([own.design for own in gradients])

@@ -6,6 +6,7 @@
 - ``messages``: what page, server and solver process say to each other
 - ``session``: project, history, and what a gesture leads to
 - ``server``: static files and a WebSocket on 127.0.0.1; ``solver``: the process that computes, ended at any time
+- ``responses``: linear ones of what the page draws; ``grip``: a point that the pointer holds
 - ``cancel``: equilibria that a new gesture ends at their next iteration; ``told``: problems with their remedies
 - ``solid``: the process that solves in space; ``job``: runs it
 - ``build``: the simulation and the design problem of a project; ``script``: the Python script that does the same

@@ -6,6 +6,7 @@ import base64
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -19,8 +20,9 @@ from fenicsmech.effects import Gravity, JointSpring, Temperature
 from fenicsmech.equilibrium import EquilibriumMethod
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import JOINT_KINDS
+from fenicsmech.laws import NeoHookean
 from fenicsmech.live.carried import made
-from fenicsmech.live.project import PAPER_NAMES, Project, forces_of
+from fenicsmech.live.project import PAPER_NAMES, Project, forces_of, materials
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -47,7 +49,7 @@ from fenicsmech.mechanism import (
     step_file,
     strip,
 )
-from fenicsmech.quantities import Displacement, ForceMagnitude, Sample, at
+from fenicsmech.quantities import Displacement, ForceMagnitude, JointPosition, MotorOffset, NumberKind, Sample, at
 from fenicsmech.simulation import CurveRequest, Simulation, read_request
 
 _PAPER = {"SMOOTH_SIL_950": SMOOTH_SIL_950, "ONYX": ONYX}
@@ -129,6 +131,20 @@ class Drawing:
         targets = [self.target(project, number, value, 1.0) for number, value in pairs]
         return self._problem(project, designs, targets) if designs else None
 
+    def movable(self, project: Project) -> list[tuple[dict[str, Any], NumberKind]]:
+        """What can be moved beside the shapes: joints that share a place along x and y, and motors; as the page names
+        them, and as numbers."""
+        places: dict[tuple[float, float], list[int]] = {}
+        for k, own in enumerate(project["joints"]):
+            places.setdefault(tuple(own["at"]), []).append(k)
+        found: list[tuple[dict[str, Any], NumberKind]] = []
+        for numbers in places.values():
+            joints = [self.joints[project["joints"][k]["name"]] for k in numbers]
+            for axis, direction in enumerate(((1.0, 0.0), (0.0, 1.0))):
+                kind = JointPosition(*joints, direction=direction)
+                found.append(({"kind": "joint", "joints": numbers, "axis": axis}, kind))
+        return found + [({"kind": "motor", "name": name}, MotorOffset(own)) for name, own in self.motors.items()]
+
     def _problem(
         self, project: Project, designs: Sequence[SplineDesign | Number], targets: Sequence[Target]
     ) -> DesignProblem:
@@ -209,6 +225,17 @@ def material_of(own: str | Mapping[str, Any]) -> Material:
     if "data" in own:
         return made(own["data"], {})
     return Material(own["name"], own["E"], own["nu"], density=own["density"])
+
+
+@cache
+def constants() -> dict[str, dict[str, float | None]]:
+    """Those of the materials by their names, from which one of its own may start; of neo-Hookean ones."""
+    laws = ((name, own.law, own.density) for name in materials() for own in [material_of(name)])
+    return {
+        name: {"E": law.E, "nu": law.nu, "density": density}
+        for name, law, density in laws
+        if isinstance(law, NeoHookean)
+    }
 
 
 def content_of(shape: Mapping[str, Any]) -> bytes:

@@ -10,7 +10,9 @@ Page to server, one WebSocket message each, at most ``LARGEST`` bytes. ``kind`` 
     undo, redo, reset   steps of the history; reset goes back to what was opened last
     open     project    replaces the project
     example  name       replaces it by one that comes with the page
-    push     curve, force   the equilibrium under a force that the pointer exerts; the project stays
+    push     curve, force   the equilibrium under a force of the curve that the pointer exerts; the project stays
+             at, by         optional: what the pointer holds, {link, place: [x, y] under the curve's force}, and the
+                            force by [x, y] that it exerts there beside that of the curve
     release             the pointer exerts none; the solver goes on with what the push had interrupted
     fit                 the design follows its targets once
     stop                ends what the solver does
@@ -21,7 +23,7 @@ Server to page, each with ``heard``, how many messages of the page came before: 
 last edit knows nothing of it. ``event`` is one of
 
     project     project, undo and redo (whether there are steps), opened (how many projects were), examples, materials,
-                    most: {curves, targets}
+                    constants: {material: {E, nu, density}}, most: {curves, targets}
     first       curves of the project as it was opened: [{force, positions, others, points: [[displacement, force]]}]
     solver      state: starting, ready, busy, idle, restarted or failed; since: seconds
     refused     place, problem: of the last message, which changed nothing
@@ -33,7 +35,7 @@ last edit knows nothing of it. ``event`` is one of
                         rigid [[[x, y]] a rigid link]
     and the results of the solver below, of the present task alone
 
-Server to solver, a line each: {task: number, kind: solve | push, project, fit, curve, force, longest
+Server to solver, a line each: {task: number, kind: solve | push, project, fit, curve, force, at, by, longest
 (seconds that it may take)}.
 
 Solver to server, a line each, with the number of their task:
@@ -48,14 +50,21 @@ Solver to server, a line each, with the number of their task:
     errors    curve, errors: estimated discretisation errors of the displacements of its points, or of the forces where
                   displacements are held, to be added; peak of the stress at its end, outside of singular places:
                   {value, error, link}, null if there is none
+    responses curve, end: rates of its last point with the force, {nodes, rigid, pins} as points have them, null where
+                  there are none; motors: {name: rates of its first point with the position of the motor}
     fitted    design, misfits, iterations, missed: {problem, remedy} of targets out of reach or an early end, null if
               all is well
     linear    the linear preview at a design, Q(p + s) ≈ Q + e + J s, R ≈ ∂R/∂p s + ½ sᵀ ∂²R/∂p² s:
                   design, lengths (typical change of each parameter), curves: [{forces, values, errors, jacobian}],
                   gradient, curvature, active (bounds that hold it back), whole (not cut where a curve snaps),
-                  links: [{name, controls [[[x, y, δ], tangent]], entries (parameter of each, −1 none), thickness}]
+                  links: [{name, controls [[[x, y, δ], tangent]], entries (parameter of each, −1 none), thickness,
+                  follows (rates of controls with each of "moves")}],
+                  moves: what follows the parameters in s and the columns of each jacobian: {kind: joint, joints
+                  (numbers of those at one place), axis (0: x, 1: y)} or {kind: motor, name};
+                  positions: of motors, of each curve
     required  values of the project's requirements, with their estimated errors: [[component]]; empty if failed
-    pushed    curve, point
+    pushed    curve, at, by, point, rates: of the point with the curve's force, or with those of what the pointer holds
+                  along x and y; none where they are not unique
     done      seconds
     cancelled
     failed    part, problem, remedy
@@ -95,6 +104,8 @@ _CHANGE = ByKind(
 )
 
 _CURVE = Number(0, MOST_CURVES - 1, whole=True)
+_FORCE = Number(-1e6, 1e6)
+_PLACE = Many(Number(-1e5, 1e5), 2, 2)
 
 PAGE = ByKind(
     {
@@ -105,7 +116,10 @@ PAGE = ByKind(
         "reset": Record({}),
         "open": Record({"project": Anything()}),
         "example": Record({"name": Text(60)}),
-        "push": Record({"curve": _CURVE, "force": Number(-1e6, 1e6)}),
+        "push": Record(
+            {"curve": _CURVE, "force": _FORCE},
+            {"at": Record({"link": Text(60), "place": _PLACE}), "by": Many(_FORCE, 2, 2)},
+        ),
         "release": Record({}),
         "fit": Record({}),
         "stop": Record({}),

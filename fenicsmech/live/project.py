@@ -282,6 +282,8 @@ def read_project(data: Any) -> Project:
             _known(own, motors, f"curves[{k}].positions")
         for own in (*curve["others"], *curve.get("ratios", ())):
             _known(own, forces, f"curves[{k}].others")
+        if curve["force"] in curve["others"]:
+            raise Refused(f"curves[{k}].others", f"{curve['force']!r} is to change and to be held constant")
     for k, target in enumerate(project["targets"]):
         if target["curve"] >= len(project["curves"]):
             raise Refused(f"targets[{k}].curve", f"there is no curve {target['curve']}")

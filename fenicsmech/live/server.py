@@ -24,6 +24,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from fenicsmech.errors import DescriptionError
+from fenicsmech.live.build import constants
 from fenicsmech.live.job import Job, events
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
 from fenicsmech.live.project import MOST_ADDED, Project, example_names, materials
@@ -67,7 +68,7 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 # results that a page which is opened later needs
-_KEPT = ("mesh", "curve", "errors", "linear", "fitted", "iterate", "required", "failed")
+_KEPT = ("mesh", "curve", "responses", "errors", "linear", "fitted", "iterate", "required", "failed")
 
 
 @dataclass(frozen=True)
@@ -374,6 +375,7 @@ class Server:
             "examples": example_names(),
             "materials": materials(),
             "most": MOST_ADDED,
+            "constants": constants(),
         }
 
     def _first_event(self) -> dict[str, Any]:

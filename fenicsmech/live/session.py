@@ -89,9 +89,7 @@ class Session:
                     raise Refused("name", "there is no such example")
                 return self._replace(example(message["name"]), opened=True)
             case "push":
-                self.check_curve(message["curve"])
-                push = {"kind": "push", "curve": message["curve"], "force": message["force"]}
-                return Answer(task={**push, "project": self.project, "fit": False})
+                return Answer(task=self._push(message))
             case "release":
                 return Answer() if self.solved else Answer(task=self.task)
             case "fit":
@@ -99,6 +97,14 @@ class Session:
             case _:
                 self._stopped = True
                 return Answer(stop=True)
+
+    def _push(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        self.check_curve(message["curve"])
+        held = message.get("at")
+        if held is not None and all(link["name"] != held["link"] for link in self.project["links"]):
+            raise Refused("at.link", f"there is no {held['link']!r}")
+        pushed = {"kind": "push", "curve": message["curve"], "force": message["force"], "at": held}
+        return {**pushed, "by": message.get("by", [0.0, 0.0]), "project": self.project, "fit": False}
 
     def check_curve(self, number: int) -> None:
         """Refuses the number of a curve that the project does not have."""

@@ -12,23 +12,27 @@ import math
 import os
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import takewhile
 from time import perf_counter
 from typing import Any, TextIO
 
 import numpy as np
 
-from fenicsmech.design import DesignIterate, DesignProblem, HandlePlacement, LevenbergMarquardt
+from fenicsmech.design import DesignIterate, DesignLinearisation, DesignProblem, HandlePlacement, LevenbergMarquardt
 from fenicsmech.equilibrium import PrimalDualNewton
-from fenicsmech.errors import EquilibriumError, FenicsmechError
+from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
 from fenicsmech.live.build import Drawing, draw, placement
 from fenicsmech.live.cancel import Cancellable, Cancelled, TooLong
+from fenicsmech.live.grip import Grip
 from fenicsmech.live.project import Project, drawing, forces_of
+from fenicsmech.live.responses import Outlines, by_force, by_motor, displacement, responses
 from fenicsmech.live.told import missed, remarks, told, too_long
+from fenicsmech.mechanism import Force
 from fenicsmech.plot import MechanismShape
 from fenicsmech.polygons import edge_loops
-from fenicsmech.simulation import Frame, MechanismPlotter, Simulation, gather
+from fenicsmech.quantities import NumberKind
+from fenicsmech.simulation import Curve, Frame, MechanismPlotter, Simulation, gather
 from fenicsmech.stress import von_mises
 
 Emit = Callable[[dict[str, Any]], None]
@@ -51,6 +55,7 @@ class Solver:
         self._end = math.inf  # of the time of the task at work
         self._drawn: tuple[str, Drawing] | None = None
         self._problems: dict[str, DesignProblem | None] = {}
+        self._grip: tuple[str, Grip] | None = None
 
     def run(self, task: Mapping[str, Any]) -> None:
         """Does a task, whose results carry its number."""
@@ -63,6 +68,7 @@ class Solver:
         emit({"event": "began"})
         try:
             if task["kind"] == "solve":
+                self.let_go()
                 Work(self, emit, task).solve()
             elif task["kind"] == "push":
                 Work(self, emit, task).push()
@@ -88,9 +94,22 @@ class Solver:
         """The drawing of a project, made when it is new."""
         text = drawing(project)
         if self._drawn is None or self._drawn[0] != text:
-            self._drawn, self._problems = None, {}
+            self._drawn, self._problems, self._grip = None, {}, None
             self._drawn = text, draw(project, self._method)
         return self._drawn[1]
+
+    def grip(self, key: str, make: Callable[[], Grip]) -> Grip:
+        """What the pointer holds, made when it is new; the one before is released."""
+        if self._grip is None or self._grip[0] != key:
+            self.let_go()
+            self._grip = key, make()
+        return self._grip[1]
+
+    def let_go(self) -> None:
+        """Releases what the pointer held."""
+        if self._grip is not None:
+            self._grip[1].release()
+        self._grip = None
 
     def problem(
         self, sort: str, project: Project, make: Callable[[Project], DesignProblem | None]
@@ -151,12 +170,38 @@ class Work:
             self._require(at)
 
     def push(self) -> None:
-        """The equilibrium under a force that the pointer exerts."""
-        at, force = placement(self._project, self._along), self._task["force"]
+        """The equilibrium under the force of a curve and that of the pointer at a point, with its linear responses."""
+        at, number, task = placement(self._project, self._along), self._task["curve"], self._task
         simulation = self._drawing.simulation if at is None else self._designed(at)
-        request = self._drawing.request(self._project, self._task["curve"], [force], pushed=True)
-        curve = simulation.compute(request)
-        self._emit({"event": "pushed", "curve": self._task["curve"], "point": self._point(curve.frames[-1])})
+        request = self._drawing.request(self._project, number, [task["force"]], pushed=True)
+        held, by = task["at"], task["by"]
+        part = self._drawing.forces[self._project["curves"][number]["force"]]
+        forces: Sequence[Force] = [part]
+        if held is None:
+            curve = simulation.compute(request)
+        else:
+
+            def grip() -> Grip:
+                link, start = self._drawing.links[held["link"]], simulation.compute(request)
+                return Grip(simulation, self._plotter, start, link, held["place"])
+
+            own = self._solver.grip(json.dumps([self._project, number, task["force"], held]), grip)
+            curve = simulation.compute(own.pulled(request, by)) if any(by) else own.start
+            forces = own.forces
+        frame, model = curve.frames[-1], simulation.model
+        solver = simulation.solver(curve.part, [force for force, _ in curve.others])
+        rates = responses(model, self._plotter, solver, frame, [by_force(model, force) for force in forces])
+        moved = displacement(model, part, frame, curve.unloaded)
+        self._emit(
+            {
+                "event": "pushed",
+                "curve": number,
+                "at": held,
+                "by": by,
+                "point": {**self._point(frame), "force": task["force"], "displacement": _number(moved)},
+                "rates": [_rates(own) for own in rates],
+            }
+        )
 
     # -- parts of tasks ------------------------------------------------------------------------------------------
 
@@ -208,10 +253,31 @@ class Work:
                 pairs = zip(forces, good, strict=False)  # fewer frames where it failed
                 self._steady[number] = [value for value, _ in takewhile(lambda pair: pair[1], pairs) if value]
             if curve is not None and iterate is None:
+                self._respond(number, curve)
                 peak = curve.frames[-1].peak
                 own = peak and {"value": _number(peak.value), "error": _number(peak.error), "link": peak.link}
                 errors = _rounded(curve.error_estimates())
                 self._emit({"event": "errors", "curve": number, "errors": errors, "peak": own})
+
+    def _respond(self, number: int, curve: Curve) -> None:
+        """How the picture changes with the force at the end of a curve, and with each motor at its begin; not of forces
+        that grow together, nor of displacements that are held."""
+        model, part, first, last = self._drawing.simulation.model, curve.part, curve.frames[0], curve.frames[-1]
+        if not isinstance(part, Force) or self._project["curves"][number].get("held"):
+            return
+        solver = self._drawing.simulation.solver(part, [force for force, _ in curve.others])
+        motors = self._drawing.motors
+        turned = [by_motor(model, own) for own in motors.values()]
+        ends = responses(model, self._plotter, solver, last, [by_force(model, part)])
+        begins = responses(model, self._plotter, solver, first, turned) if turned else []
+        self._emit(
+            {
+                "event": "responses",
+                "curve": number,
+                "end": next((_rates(own) for own in ends), None),
+                "motors": {name: _rates(own) for name, own in zip(motors, begins, strict=False)},
+            }
+        )
 
     def _linearise(self, at: HandlePlacement | None) -> None:
         """What the page's linear preview needs."""
@@ -227,7 +293,7 @@ class Work:
             if along is None:
                 return
         try:
-            found = along.linearise(along.initial if at is None else at)
+            movable, found = self._with_moves(along, along.initial if at is None else at)
         except EquilibriumError:
             return  # the curve that ends early is told already
         self._solver.check()
@@ -237,7 +303,8 @@ class Work:
             rows += len(forces)
             if curve.get("held") or "ratios" in curve:  # no displacements of one force under it
                 forces, mine = [], slice(0)
-            own = {"values": found.values[mine], "errors": found.errors[mine], "jacobian": found.jacobian[mine]}
+            slopes = np.hstack([found.jacobian, found.by_numbers])[mine]
+            own = {"values": found.values[mine], "errors": found.errors[mine], "jacobian": slopes}
             curves.append({"forces": forces, **{key: _rounded(value) for key, value in own.items()}})
         drawn = {own["name"]: own["shape"] for own in self._project["links"] if own["kind"] == "flexible"}
         self._emit(
@@ -245,6 +312,8 @@ class Work:
                 "event": "linear",
                 "design": _design(along, found.placement),
                 "lengths": _rounded(found.lengths),
+                "moves": [own for own, _ in movable],
+                "positions": [own["positions"] for own in self._project["curves"]],
                 "curves": curves,
                 "gradient": _rounded(found.regulariser.gradient),
                 "curvature": _rounded(found.regulariser.curvature),
@@ -255,9 +324,12 @@ class Work:
                         "name": link.name,
                         "controls": _rounded(link.controls),
                         "entries": entries.tolist(),
+                        "follows": _rounded(follows),
                         "thickness": drawn[link.name].get("thickness"),
                     }
-                    for link, entries in zip(found.links, found.entries, strict=True)
+                    for link, entries, follows in zip(
+                        found.links, found.entries, found.controls_by_numbers, strict=True
+                    )
                 ],
             }
         )
@@ -275,6 +347,18 @@ class Work:
         rows = np.split(found.values + found.errors, np.cumsum([target.size for target in problem.targets])[:-1])
         wanted = rows[len(self._project["targets"]) :]
         self._emit({"event": "required", "values": [_rounded(own) for own in wanted], "failed": None})
+
+    def _with_moves(
+        self, along: DesignProblem, at: HandlePlacement | np.ndarray
+    ) -> tuple[list[tuple[dict[str, Any], NumberKind]], DesignLinearisation]:
+        """The derivatives at a design, and what they are taken by beside it: motors alone where links cannot follow."""
+        movable = self._drawing.movable(self._project)
+        for own in (movable, [(name, kind) for name, kind in movable if name["kind"] == "motor"]):
+            try:
+                return own, along.linearise(at, numbers=[kind for _, kind in own])
+            except DescriptionError:
+                continue
+        return [], along.linearise(at)
 
     def _point(self, frame: Frame) -> dict[str, Any]:
         """A frame as the page draws it, its mesh sent once before."""
@@ -329,6 +413,12 @@ def _turned(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def _design(problem: DesignProblem, at: HandlePlacement) -> dict[str, list[float]]:
     return {"offsets": (at.p - problem.initial).tolist(), "handles": at.theta.tolist()}
+
+
+def _rates(found: Outlines) -> dict[str, Any]:
+    """Rates of what is drawn, as the page draws them."""
+    nodes, rigid = ([_rounded(points, 5) for points in own] for own in (found.nodes, found.rigid))
+    return {"nodes": nodes, "rigid": rigid, "pins": _rounded(found.pins, 5)}
 
 
 def _number(value: float) -> float | None:

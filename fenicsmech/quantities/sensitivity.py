@@ -74,6 +74,12 @@ class Sensitivity:
         self._model, self._numbers = model, [model.number(kind) for kind in numbers]
         self._weights = [fem.Function(field.function_space, name="adjoint") for field in model.elastic.fields]
 
+    def with_numbers(self, numbers: Sequence[NumberKind]) -> Sensitivity:
+        """The same with other numbers, which shares what is compiled."""
+        other = Sensitivity(self._model, numbers)
+        other._weights, other._work = self._weights, self._work
+        return other
+
     def gradients(
         self, solver: EquilibriumSolver, state: State, control: Control, observables: Sequence[Observable]
     ) -> list[Gradient]:

@@ -157,6 +157,10 @@ class Discretisation:
             self._solvers[key] = self.method.solver(self.model.system(self._controlled_load(part), loads))
         return self._solvers[key]
 
+    def forget(self, part: PrescribedPart) -> None:
+        """Drops the solvers of a part. Local."""
+        self._solvers = {key: own for key, own in self._solvers.items() if key[0] != part}
+
     def followed_control(self, part: PrescribedPart) -> LoadControl | MotorControl:
         """The control whose value changes along the path of a part."""
         if isinstance(part, Force | ForceGroup):

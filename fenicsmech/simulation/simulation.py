@@ -506,6 +506,10 @@ class Simulation:
         """The solver for a force or motors that change and some constant forces, whose magnitudes states hold."""
         return self._discretisation.solver(part, others)
 
+    def forget(self, part: PrescribedPart) -> None:
+        """Gives the memory of the solvers of a part back, which are made anew when they are needed. Local."""
+        self._discretisation.forget(part)
+
     def compute(self, request: CurveRequest, *, watch: Callable[[int], None] = lambda done: None) -> Curve:
         """The curve of a checked request, like ``load_displacement`` but without showing progress.
 

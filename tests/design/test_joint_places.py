@@ -106,6 +106,20 @@ def test_shifted_joints_of_rigid_links_are_joints_drawn_there(space):
     assert np.abs(found - before).max() > 0.01 * np.abs(before).max()
 
 
+def test_derivatives_by_a_joint_that_a_problem_does_not_move_are_those_by_differences():
+    case = truss((0.1, 6.0), (0.4, 9.0))
+    tip = [joint for joint in case.scene.mechanism.joints if joint.at[:2] == (40, 60)]
+    kind, coarse = fm.JointPosition(*tip, direction=(1, 1)), {"size": 6.0, "order": 1}
+    problem = case.problem(**coarse)
+    found = problem.linearise(problem.initial, numbers=[kind])
+    moving = Case(case.scene, [*case.designs, fm.Number(kind, -1.0, 1.0)], case.targets).problem(**coarse)
+    below, above = (moving.linearise(np.append(problem.initial, q)) for q in (0.49, 0.51))  # 0.04 mm apart
+    assert found.by_numbers[:, 0] == pytest.approx((above.values - below.values) / 0.04, rel=3e-4)
+    followed = np.subtract(above.links[0].controls, below.links[0].controls) / 0.04
+    assert found.controls_by_numbers[0][..., 0] == pytest.approx(followed, abs=1e-9)
+    assert found.jacobian == pytest.approx(problem.linearise(problem.initial).jacobian, rel=1e-9)
+
+
 def test_places_in_files_are_those_written_to_the_last_digit():
     machine, rng = Machine(), np.random.default_rng(7)
     pair = machine.joints["pin"], machine.joints["axle"]

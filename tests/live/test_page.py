@@ -6,6 +6,7 @@ Screenshots stay in results/live/.
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import subprocess
@@ -26,6 +27,7 @@ from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.actions.pointer_input import PointerInput
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 
 import fenicsmech as fm
 from fenicsmech.live import Server, ServerOptions, example, project_of
@@ -209,12 +211,88 @@ def test_a_joint_that_is_dragged_changes_the_mechanism_and_its_design_follows(pa
     choose(page, "move")
 
 
+def change(page, *path, value):
+    """Sets a value of the project, and waits for what it leads to."""
+    edit = {"kind": "edit", "changes": [{"kind": "set", "path": path, "value": value}], "settled": True}
+    page.run(f"live.send({json.dumps(edit)})")
+    page.until("document.body.dataset.solver === 'idle'")
+    page.settled()
+
+
+PREVIEWED = """
+    const own = live.store.base().curves[0], s = live.store.previewed;
+    const row = own.jacobian.at(-1);
+    return own.values.at(-1) + row.reduce((sum, slope, k) => sum + slope * s[k], 0);
+"""
+END = "return live.store.curves[0].points.at(-1).displacement"
+
+
+def test_the_preview_of_a_joint_that_is_dragged_leads_where_the_solve_does(page):
+    change(page, "fit", value=False)
+    choose(page, "shape")
+    page.until("document.querySelectorAll('.handle.joint').length === 4")
+    page.run("window.first = live.store.linear")
+    before, found = page.run(END), []
+
+    def during():
+        found.append(page.run(PREVIEWED))
+        found.append(page.run("return document.querySelectorAll('#chart .preview, #view .preview').length"))
+        page.picture("joint-preview")
+
+    page.drag(page.chrome.find_elements(By.CSS_SELECTOR, ".handle.joint")[3], 4, 0, steps=4, during=during)
+    page.until("live.store.project.joints[3].at[0] > 40 && document.body.dataset.solver === 'idle'")
+    page.settled()
+    after = page.run(END)
+    assert found[1] >= 2 and abs(after - before) > 0.05
+    assert found[0] - before == pytest.approx(after - before, rel=0.2)
+    line = page.run("return live.store.project.links[4].shape.line")
+    assert line[2] == page.run("return live.store.project.joints[5].at") and 18.0 < line[1][0] < line[2][0] - 22.0
+    page.chrome.find_element(By.ID, "reset").click()
+    page.until("live.store.project.joints[3].at[0] === 40 && live.store.project.fit")
+    page.settled()
+    choose(page, "move")
+
+
+def test_the_preview_of_a_push_at_a_point_leads_where_the_solve_does(page):
+    page.run("document.getElementById('play').click(); live.store.load = 0.5; live.store.show()")
+    view = page.chrome.find_element(By.ID, "view")
+    x, y = page.run("""
+        const { view, store } = live, tip = store.drawnMesh().rigid.findIndex((own) => own.name === "tip");
+        const [a, b] = view.now.rigid[tip], { width, height } = view.svg.getBoundingClientRect();
+        const [across, up] = [0, 1].map((k) => view.scale * (a[k] + b[k]) / 2);
+        return [view.origin[0] + across - width / 2, view.origin[1] - up - height / 2];
+    """)
+    hand = ActionChains(page.chrome, duration=0).move_to_element_with_offset(view, round(x), round(y))
+    hand.click_and_hold().perform()
+    page.until("live.handles.pushed.from && live.handles.pushed.asked === null", 20)
+    assert page.run("return live.handles.pushed.held.at.link") == "tip"
+    page.run("window.first = live.handles.pushed.from; live.store.leans = 0")
+    for _ in range(8):
+        ActionChains(page.chrome, duration=10).move_by_offset(0, 1).perform()
+    ActionChains(page.chrome).pause(0.3).perform()
+    page.until("live.handles.pushed.asked === null && live.handles.pushed.from !== first", 20)
+    assert page.run("return live.store.leans") >= 4
+    assert page.run("return document.querySelectorAll('#view .preview').length") == 1
+    page.picture("pushed-at-a-point")
+    first, now, by = page.run("return [first, live.handles.pushed.from, live.handles.pushed.by]")
+    assert now["by"] == pytest.approx(by, rel=1e-3, abs=1e-6) and by[1] < -0.003
+    before, wanted = (np.concatenate(own["state"]["nodes"]) for own in (first, now))
+    rates = [np.concatenate(own["nodes"]) for own in first["rates"]]
+    missed = before + by[0] * rates[0] + by[1] * rates[1] - wanted
+    assert np.abs(missed).max() < 0.1 * np.abs(wanted - before).max()
+    ActionChains(page.chrome).release().perform()
+    page.until("!live.store.pushed && !live.store.leaning")
+    page.run("document.getElementById('play').click()")
+
+
 def test_a_push_beyond_the_curve_is_solved(page):
     view = page.chrome.find_element(By.ID, "view")
-    ActionChains(page.chrome, duration=0).move_to_element(view).click_and_hold().perform()
+    corner = [round(-0.47 * view.rect[side]) for side in ("width", "height")]
+    hand = ActionChains(page.chrome, duration=0).move_to_element_with_offset(view, *corner)
+    hand.click_and_hold().perform()
     for _ in range(15):
         ActionChains(page.chrome, duration=10).move_by_offset(14, 0).perform()
-    page.until("live.store.pushed && live.store.pushed.force > 0.41")
+    page.until("live.store.leaning && live.store.pushed && live.store.pushed.force > 0.41")
     page.picture("pushed")
     assert page.run("return live.store.pushed.displacement") > page.run(
         "return live.store.curves[0].points.at(-1).displacement"
@@ -292,7 +370,10 @@ def test_keys_move_add_and_remove_targets_joints_and_pushes(page):
     page.chrome.switch_to.active_element.send_keys(Keys.ARROW_UP)
     page.until("live.store.project.forces[0].at[1] > 70")
     page.until("document.activeElement.matches('.handle.force')", 20)  # keys go on with it
-    assert all(own.get_attribute("aria-label") for own in page.chrome.find_elements(By.CSS_SELECTOR, "[tabindex='0']"))
+    labelled = (
+        "return [...document.querySelectorAll('[tabindex=\"0\"]')].every((own) => own.getAttribute('aria-label'))"
+    )
+    assert page.run(labelled)
     page.chrome.find_element(By.ID, "undo").click()
     page.until("live.store.project.forces[0].at[1] === 70")
     page.settled()
@@ -363,6 +444,70 @@ def test_a_curve_of_a_new_force_is_added_dragged_and_removed(page):
     choose(page, "move")
 
 
+def field(page, name):
+    """The last field of that name beside the pictures."""
+    rows = [own for own in page.chrome.find_elements(By.CSS_SELECTOR, "#side label") if own.text.split("\n")[0] == name]
+    return rows[-1].find_element(By.CSS_SELECTOR, "input, select")
+
+
+def enter(page, name, value):
+    """Gives a number to a field."""
+    found = field(page, name)
+    found.clear()
+    found.send_keys(str(value), Keys.ENTER)
+
+
+def pick(page, name, text):
+    """Chooses from a list."""
+    Select(field(page, name)).select_by_visible_text(text)
+
+
+def test_materials_springs_model_and_constant_forces_are_changed_beside_the_pictures(page):
+    before = page.run("return live.store.curves[0].points[1].displacement")
+    change(page, "fit", value=False)
+    pick(page, "material", "numbers of its own…")
+    page.until("live.store.project.links[4].material.E === 1.9", 20)
+    page.until("document.querySelector('#side').innerText.includes('E [MPa]')", 20)
+    enter(page, "E [MPa]", 2.5)
+    page.until("live.store.project.links[4].material.E === 2.5", 20)
+    page.settled()
+    assert page.run("return live.store.curves[0].points[1].displacement") < 0.95 * before
+    enter(page, "ν", 0.6)
+    page.until("document.getElementById('told').innerText.includes('nu: not between')", 20)
+    assert page.run("return live.store.project.links[4].material.nu") == 0.475
+    enter(page, "stiffness [N mm]", 50)
+    page.until("live.store.project.effects.some((own) => own.stiffness === 50)", 20)
+    pick(page, "model", "plane strain")
+    page.until("live.store.project.simulation.space === 'plane-strain'", 20)
+    page.chrome.find_element(By.ID, "add-force").click()
+    page.until("live.store.project.curves[0].others['force 2'] === 0.04", 20)
+    page.settled()
+    page.picture("constant-force")
+    enter(page, "constant [N]", 0)
+    page.until("!('force 2' in live.store.project.curves[0].others)", 20)
+    page.until("document.querySelector('#side').innerText.includes('Remove force 2')", 20)  # the fields are made anew
+    page.settled()
+    field(page, "changes shape").click()
+    page.until("live.store.project.links[4].design === null && document.body.dataset.solver === 'idle'")
+    page.chrome.find_element(By.ID, "reset").click()
+    page.until("live.store.project.fit && live.store.project.forces.length === 1")
+    page.settled()
+
+
+def test_a_curve_takes_another_force_and_its_own_is_removed_with_it(page):
+    page.chrome.find_element(By.ID, "add-curve").click()
+    page.until("live.store.project.curves.length === 2 && live.store.shown === 1", 20)
+    pick(page, "force", "push on tip")
+    page.until("live.store.project.curves[1].force === 'push on tip' && live.store.project.forces.length === 1", 20)
+    page.settled()
+    page.until("live.store.curves[1] && live.store.curves[1].iterate === null")
+    ends = page.run("return [0, 1].map((k) => live.store.curves[k].points.at(-1).displacement)")
+    assert ends[1] == pytest.approx(ends[0], rel=1e-4)
+    page.chrome.find_element(By.ID, "reset").click()
+    page.settled()
+    choose(page, "move")
+
+
 def test_the_button_for_curves_rests_at_the_last_that_the_page_adds(page):
     add = page.chrome.find_element(By.ID, "add-curve")
     for count in (2, 3, 4):
@@ -411,6 +556,10 @@ def test_the_slider_of_a_motor_is_the_same_while_it_is_dragged(motor_page):
 
     def during():
         page.until("Object.values(live.store.project.curves[live.store.shown].positions).some(at => at)")
+        page.until(
+            "document.querySelectorAll('#chart .preview').length && document.querySelectorAll('#view .preview').length"
+        )
+        page.picture("motor-preview")
         seen.append(page.run("return document.activeElement.matches('#side input[type=range]')"))
 
     page.drag(slider, 20, 0, steps=8, during=during)
@@ -425,6 +574,20 @@ def test_the_slider_of_a_motor_is_the_same_while_it_is_dragged(motor_page):
     page.until("Object.values(live.store.project.curves[live.store.shown].positions).includes(0.3)")
     page.settled()
     assert page.run("return live.store.curve().points.at(-1).displacement") != before
+
+
+def test_a_curve_of_the_same_force_is_added_with_the_motor_elsewhere(motor_page):
+    page = motor_page
+    count = page.run("return live.store.project.curves.length")
+    page.chrome.find_element(By.ID, "add-position").click()
+    page.until(f"live.store.project.curves.length === {count + 1} && live.store.shown === {count}", 20)
+    page.until(f"live.store.curves[{count}] && live.store.curves[{count}].iterate === null")
+    first, added = page.run("return [live.store.project.curves[0], live.store.project.curves.at(-1)]")
+    assert first["force"] == added["force"] and page.run("return live.store.project.forces.length") == 1
+    (motor,) = added["positions"]
+    assert added["positions"][motor] == pytest.approx(first["positions"].get(motor, 0.0) + 0.2)
+    page.settled()
+    page.picture("position")
 
 
 def test_the_finger_becomes_a_fifth_stiffer_by_one_button(page):

@@ -64,7 +64,122 @@ def test_the_linear_preview_is_the_derivative_of_the_curve(finished):
         at = edited(project, [{"kind": "set", "path": ["design", "offsets"], "value": offsets}])
         moved.append([point["displacement"] for point in only(solved(at), "curve")[0]["points"][1:]])
     change = 0.5 * (np.array(moved[1]) - moved[0])
-    assert np.array(own["jacobian"]) @ step == pytest.approx(change, rel=0.02, abs=0.02 * np.abs(change).max())
+    assert np.array(own["jacobian"])[:, : len(step)] @ step == pytest.approx(
+        change, rel=0.02, abs=0.02 * np.abs(change).max()
+    )
+
+
+def displacements(project):
+    """Of the first curve, from its second frame on."""
+    return np.array([point["displacement"] for point in only(solved(project), "curve")[0]["points"][1:]])
+
+
+@pytest.mark.thorough
+def test_the_linear_preview_of_a_joint_is_that_of_the_mechanism_drawn_there(finished):
+    project, events = finished
+    (linear,), moved = only(events, "linear"), []
+    column = linear["moves"].index({"kind": "joint", "joints": [3, 5], "axis": 0}) + len(linear["lengths"])
+    for x in (-0.2, 0.2):
+        changes = [{"kind": "set", "path": ["joints", k, "at"], "value": [40 + x, 60]} for k in (3, 5)]
+        bend = np.hypot(18, 34) / (np.hypot(18, 34) + np.hypot(22, 26))
+        line = [[0, 0], [18 + bend * x, 34], [40 + x, 60]]
+        changes.append({"kind": "set", "path": ["links", 4, "shape", "line"], "value": line})
+        moved.append(displacements(edited(project, changes)))
+    slope = np.array(linear["curves"][0]["jacobian"])[:, column]
+    assert slope == pytest.approx((moved[1] - moved[0]) / 0.4, rel=0.05)
+    controls = np.array(linear["links"][0]["follows"])[..., linear["moves"].index(linear["moves"][0])]
+    assert controls[:, 0, 0] == pytest.approx([1, 2 / 3, 1 / 3, 0])  # with the foot along x
+
+
+@pytest.mark.thorough
+def test_the_linear_preview_of_a_motor_is_that_of_the_mechanism_turned():
+    project = edited(
+        example("four-bar-with-a-motor"),
+        [
+            {"kind": "set", "path": ["curves", 0, "steps"], "value": 2},
+            {"kind": "set", "path": ["simulation", "order"], "value": 1},
+        ],
+    )
+    events = solved(project)
+    (linear,), moved, begins = only(events, "linear"), [], []
+    ((name, rates),) = only(events, "responses")[0]["motors"].items()
+    column = linear["moves"].index({"kind": "motor", "name": name}) + len(linear["lengths"])
+    at = project["curves"][0]["positions"].get(name, 0.0)
+    for turn in (-0.05, 0.05):
+        change = {"kind": "set", "path": ["curves", 0, "positions"], "value": {name: at + turn}}
+        points = only(solved(edited(project, [change])), "curve")[0]["points"]
+        moved.append(np.array([point["displacement"] for point in points[1:]]))
+        begins.append(every(points[0]))
+    slope = np.array(linear["curves"][0]["jacobian"])[:, column]
+    assert slope == pytest.approx((moved[1] - moved[0]) / 0.1, rel=0.01)
+    rate = (begins[1] - begins[0]) / 0.1
+    assert every(rates) == pytest.approx(rate, abs=0.01 * np.abs(rate).max())
+
+
+def drawn(project):
+    """The project with its links as drawn."""
+    return edited(project, [{"kind": "set", "path": ["design"], "value": None}])
+
+
+@pytest.mark.thorough
+def test_a_material_of_its_own_of_twice_the_modulus_bears_twice_the_force(finished):
+    soft = drawn(finished[0])
+    own = {"name": "own", "E": 3.8, "nu": 0.475, "density": None}  # that of the example has 1.9
+    changes = [
+        {"kind": "set", "path": ["links", 4, "material"], "value": own},
+        {"kind": "set", "path": ["curves", 0, "largest"], "value": 2 * soft["curves"][0]["largest"]},
+        *({"kind": "set", "path": ["targets", k, "force"], "value": force} for k, force in enumerate((0.2, 0.8))),
+    ]
+    assert displacements(edited(soft, changes)) == pytest.approx(displacements(soft), rel=1e-5)
+
+
+@pytest.mark.thorough
+def test_plane_strain_is_stiffer_than_plane_stress_as_plates_are_than_beams(finished):
+    project = edited(drawn(finished[0]), [{"kind": "set", "path": ["curves", 0, "largest"], "value": 0.002}])
+    order = {"kind": "set", "path": ["simulation", "order"], "value": 2}  # the first is too stiff in bending
+    project = edited(project, [*[{"kind": "remove", "path": ["targets", 0]}] * 2, order])
+    strain = edited(project, [{"kind": "set", "path": ["simulation", "space"], "value": "plane-strain"}])
+    nu = 0.475
+    assert displacements(project) / displacements(strain) == pytest.approx(1.0 / (1.0 - nu**2), rel=0.03)
+
+
+@pytest.mark.thorough
+def test_a_spring_of_a_joint_bears_its_part_of_the_force(finished):
+    project, stiffness, height = drawn(finished[0]), 200.0, 60.0  # N mm/rad, mm
+    spring = {"kind": "joint spring", "joint": "foot of left leg", "stiffness": stiffness, "rest": 0.0}
+    sprung = edited(project, [{"kind": "insert", "path": ["effects", 0], "value": spring}])
+    (bare,), (held,) = (only(solved(own), "curve") for own in (project, sprung))
+    for point in held["points"][1:]:
+        angle = np.arcsin(point["displacement"] / height)  # of the legs: work k φ dφ = F du, u = h sin φ
+        share = stiffness * angle / (height * np.cos(angle))
+        alone = solved(project, kind="push", curve=0, force=point["force"] - share, at=None, by=[0.0, 0.0])
+        assert only(alone, "pushed")[0]["point"]["displacement"] == pytest.approx(point["displacement"], rel=1e-4)
+    assert held["points"][-1]["displacement"] < 0.95 * bare["points"][-1]["displacement"]
+
+
+@pytest.mark.thorough
+def test_a_constant_force_along_that_of_a_curve_adds_to_it(finished):
+    project = drawn(finished[0])
+    other = {"name": "constant", "on": "tip", "at": [5, 62], "direction": [1, 0]}
+    changes = [
+        {"kind": "insert", "path": ["forces", 1], "value": other},
+        {"kind": "set", "path": ["curves", 0, "others"], "value": {"constant": 0.1}},
+    ]
+    (curve,) = only(solved(edited(project, changes)), "curve")
+    for point in curve["points"]:
+        alone = push(project, point["force"] + 0.1)["point"]
+        assert point["displacement"] == pytest.approx(alone["displacement"], rel=1e-5)  # the tip is not turned
+
+
+@pytest.mark.thorough
+def test_links_that_keep_their_shape_have_no_parameters_and_those_that_change_it_as_many_as_their_segments_need(
+    finished,
+):
+    project, found = drawn(finished[0]), []
+    for design in (None, {"segments": 2, "thickness": None}, {"segments": 3, "thickness": None}):
+        own = edited(project, [{"kind": "set", "path": ["links", 4, "design"], "value": design}])
+        found.append([len(event["lengths"]) for event in only(solved(own), "linear")])
+    assert found == [[], [12], [18]]
 
 
 @pytest.mark.thorough
@@ -196,12 +311,46 @@ def test_a_solve_whose_time_is_over_keeps_the_last_iterate_and_tells_its_reason_
     assert events[-1]["event"] == "done"
 
 
+def push(project, force, at=None, by=(0.0, 0.0)):
+    """The answer to a push."""
+    (pushed,) = only(solved(project, kind="push", curve=0, force=force, at=at, by=list(by)), "pushed")
+    return pushed
+
+
 def test_a_push_moves_as_far_as_the_curve_says(finished):
     project, events = finished
-    (pushed,) = only(solved(project, kind="push", curve=0, force=0.2), "pushed")
+    pushed = push(project, 0.2)
     points = only(events, "curve")[0]["points"]
     expected = next(point["displacement"] for point in points if point["force"] == pytest.approx(0.2))
     assert pushed["point"]["displacement"] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        pytest.param({"link": "diagonal", "place": [20.0, 30.0]}, id="flexible link"),
+        pytest.param({"link": "tip", "place": [10.0, 66.0]}, id="rigid link", marks=pytest.mark.thorough),
+    ],
+)
+def test_the_preview_of_a_push_at_any_point_misses_its_solve_by_the_square_of_the_push(finished, held):
+    project, _ = finished
+    start, missed = push(project, 0.1, held), []
+    for size in (0.04, 0.02):  # N
+        by = np.array([0.6, -0.8]) * size
+        end = push(project, 0.1, held, by)
+        assert end["by"] == by.tolist() and end["point"]["force"] == 0.1
+        wanted, linear, before = (every(own) for own in (end["point"], start["rates"], start["point"]))
+        moved = np.array([by[0] * along + by[1] * across for along, across in zip(*linear, strict=True)])
+        missed.append(np.abs(before + moved - wanted).max())
+        assert missed[-1] < 0.2 * np.abs(wanted - before).max()
+    assert missed[0] / missed[1] == pytest.approx(4.0, rel=0.2)
+
+
+def every(found):
+    """All coordinates of a point, or of each of some rates."""
+    if isinstance(found, list):
+        return [every(own) for own in found]
+    return np.concatenate([np.ravel(own) for own in (*found["nodes"], *found["rigid"], found["pins"])])
 
 
 @pytest.mark.parametrize("aimed", [pytest.param(True, id="with targets"), pytest.param(False, id="without")])

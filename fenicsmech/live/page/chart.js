@@ -243,7 +243,9 @@ export class Chart {
   preview() {
     const { store } = this, s = store.previewed, base = store.base(), parts = [];
     if (s && base && base.curves[store.shown]) {
-      parts.push(make("path", { class: "preview", d: path(curveAfter(base, store.shown, s).map((p) => this.px(p))) }));
+      const points = curveAfter(base, store.shown, s).map((p) => this.px(p)), [x, y] = points.at(-1);
+      parts.push(make("path", { class: "preview", d: path(points) }),
+        make("text", { class: "preview-name", x: Math.min(x - 8, this.width - 20), y: Math.max(y - 8, 24), "text-anchor": "end" }, "linear preview"));
     }
     this.layers.preview.replaceChildren(...parts);
   }

@@ -1,7 +1,6 @@
 // What can be dragged in the mechanism: joints, control points and thicknesses of links at rest, and the push on it.
 
-
-import { controlsAfter, outline } from "./preview.js";
+import { controlsAfter, entryOf, lineAfter, nothing, outline } from "./preview.js";
 import { drag, make } from "./svg.js";
 
 const REST = 350; // ms after which a resting gesture is solved
@@ -34,15 +33,10 @@ export class Handles {
     const { store } = this, found = [], places = new Map();
     store.project.joints.forEach((joint, k) => {
       const name = joint.at.join(" ");
-      if (!places.has(name)) places.set(name, { kind: "joint", at: joint.at, joints: [], points: [], label: joint.name });
+      if (!places.has(name)) places.set(name, { kind: "joint", at: joint.at, joints: [], label: joint.name });
       places.get(name).joints.push(k);
     });
-    for (const place of places.values()) {
-      store.project.links.forEach((link, k) => (link.shape && link.shape.line || []).forEach((point, j) => {
-        if (Math.hypot(point[0] - place.at[0], point[1] - place.at[1]) < 1e-6) place.points.push([k, j]);
-      }));
-      found.push(place);
-    }
+    found.push(...places.values());
     const number = store.project.forces.findIndex((own) => own.name === store.project.curves[store.shown].force), force = store.project.forces[number];
     const along = force.direction.map((part) => part / Math.hypot(...force.direction)), out = 34 * px;
     found.push({ kind: "direction", at: force.at.map((part, a) => part + out * along[a]), number, origin: force.at, label: `direction of ${force.name}` },
@@ -62,11 +56,12 @@ export class Handles {
 
   // The project's design less that of the linear model: what was changed since, and is being solved.
   shift() {
-    const { linear, project } = this.store, none = linear ? linear.lengths.map(() => 0) : [];
-    if (!linear) return none;
-    const offsets = project.design ? project.design.offsets : none, { handles } = linear.design;
-    const same = offsets.length === none.length && (!project.design || JSON.stringify(project.design.handles) === JSON.stringify(handles));
-    return same ? linear.design.offsets.map((own, k) => offsets[k] - own) : none;
+    const { linear, project } = this.store, s = linear ? nothing(linear) : [];
+    if (!linear) return s;
+    const { offsets, handles } = linear.design, now = project.design ? project.design.offsets : offsets.map(() => 0);
+    const same = now.length === offsets.length && (!project.design || JSON.stringify(project.design.handles) === JSON.stringify(handles));
+    if (same) offsets.forEach((own, k) => { s[k] = now[k] - own; });
+    return s;
   }
 
   handle(own, px) {
@@ -99,11 +94,13 @@ export class Handles {
     return shape;
   }
 
-  // Begins a gesture. Its moves are counted from the linear model of its begin: one that is solved at a rest has moved.
+  // Begins a gesture. Its moves are counted from the drawing and the linear model of its begin: what is solved at a rest has
+  // moved.
   hold(own, shape, start, px) {
-    const { linear } = this.store;
+    const { linear, project } = this.store;
     if (own.link && !linear) return false;
-    this.held = { own, shape, start, linear, shift: this.shift(), move: [0, 0], moved: false, sent: false, px };
+    const drawn = structuredClone({ joints: project.joints, links: project.links });
+    this.held = { own, shape, start, linear, drawn, shift: this.shift(), move: [0, 0], moved: false, sent: false, px };
     shape.classList.add("held");
     return true;
   }
@@ -124,7 +121,7 @@ export class Handles {
       const along = held.move[0] * own.normal[0] + held.move[1] * own.normal[1];
       held.move = own.normal.map((part) => part * along);
     }
-    if (own.link) store.previewed = this.step();
+    if (own.link || this.along().length) store.previewed = this.step();
     if (!held.pending) {
       held.pending = true;
       requestAnimationFrame(() => { held.pending = false; if (this.held === held) { this.view.draw(); store.drawCurve(); } });
@@ -133,10 +130,18 @@ export class Handles {
     held.rest = setTimeout(() => { if (this.held === held) this.send(false); }, REST);
   }
 
-  // Parameters' change by the gesture.
+  // Entries of s along x and y of the joints that are held; none if there is no linear preview of them.
+  along() {
+    const { own, linear } = this.held;
+    if (own.kind !== "joint" || !linear) return [];
+    return [0, 1].map((axis) => entryOf(linear, { kind: "joint", joints: own.joints, axis })).filter((entry) => entry >= 0);
+  }
+
+  // The change by the gesture of parameters and joints.
   step() {
     const { own, move, shift } = this.held, s = shift.slice();
-    if (own.kind === "control") [0, 1].forEach((a) => { s[own.entries[a]] += move[a]; });
+    if (own.kind === "joint") this.along().forEach((entry, a) => { s[entry] += move[a]; });
+    else if (own.kind === "control") [0, 1].forEach((a) => { s[own.entries[a]] += move[a]; });
     else if (own.kind === "slope") [0, 1].forEach((a) => { s[own.entries[a]] += 3 * move[a]; });
     else {
       const along = move[0] * own.normal[0] + move[1] * own.normal[1];
@@ -149,26 +154,33 @@ export class Handles {
     const { own, shape, move, linear } = this.held;
     shape.setAttribute("transform", `translate(${move[0]} ${move[1]})`);
     if (own.kind !== "joint" || !this.held.moved) return;
-    // the links that end here, dashed
+    // rigid links that meet here, dashed; flexible ones too where the preview does not have them
     const { store } = this, to = own.at.map((part, a) => part + move[a]), lines = [];
-    const bent = (linear ? linear.links : []).filter((link) => own.points.some(([k]) => store.project.links[k].name === link.name));
-    for (const link of bent) {
-      const ends = [0, link.controls.length - 1], far = (k) => Math.hypot(link.controls[k][0][0] - own.at[0], link.controls[k][0][1] - own.at[1]);
-      const first = far(ends[0]) < far(ends[1]), count = link.controls.length - 1;
-      const moved = link.controls.map(([P, M], k) => {
-        const share = first ? 1 - k / count : k / count, slope = (first ? -1 : 1) / count;
-        return [[P[0] + share * move[0], P[1] + share * move[1], P[2]], [M[0] + slope * move[0], M[1] + slope * move[1], M[2]]];
-      });
-      lines.push(`M${outline(moved, link.thickness).map((point) => point.join(" ")).join("L")}Z`);
+    const drawn = this.along().length ? linear.links.map((link) => link.name) : [];
+    for (const { link, line } of this.lines()) {
+      if (!drawn.includes(store.project.links[link].name)) lines.push(`M${line.map((point) => point.join(" ")).join("L")}`);
     }
     for (const k of own.joints) for (const end of ["a", "b"]) {
-      const name = store.project.joints[k][end];
-      if (bent.some((link) => link.name === name)) continue;
+      const name = store.project.joints[k][end], link = store.project.links.find((other) => other.name === name);
+      if (link.kind === "flexible") continue;
       for (const joint of store.project.joints) {
         if ([joint.a, joint.b].includes(name) && !own.joints.includes(store.project.joints.indexOf(joint))) lines.push(`M${to.join(" ")}L${joint.at.join(" ")}`);
       }
     }
-    this.view.layers.preview.replaceChildren(make("path", { class: "preview", d: lines.join("") }));
+    if (lines.length) this.view.layers.preview.append(make("path", { class: "preview", d: lines.join("") }));
+  }
+
+  // Centrelines of the strips that follow the joints that are held.
+  lines() {
+    const { own, move, drawn: { joints, links } } = this.held, found = [];
+    links.forEach((link, k) => {
+      if (!link.shape || !link.shape.line) return;
+      const mine = joints.map((joint, j) => [joint, j]).filter(([joint]) => [joint.a, joint.b].includes(link.name));
+      if (!mine.some(([, j]) => own.joints.includes(j))) return;
+      const shifts = mine.map(([, j]) => own.joints.includes(j) ? move : [0, 0]);
+      found.push({ link: k, line: lineAfter(link.shape.line, mine.map(([joint]) => joint.at), shifts) });
+    });
+    return found;
   }
 
   send(settled) {
@@ -177,7 +189,10 @@ export class Handles {
     if (own.kind === "joint") {
       const to = own.at.map((part, a) => Number((part + held.move[a]).toFixed(2)));
       const changes = own.joints.map((k) => ({ kind: "set", path: ["joints", k, "at"], value: to }));
-      own.points.forEach(([link, j]) => changes.push({ kind: "set", path: ["links", link, "shape", "line", j], value: to }));
+      held.move = to.map((part, a) => part - own.at[a]); // as rounded
+      for (const { link, line } of this.lines()) {
+        changes.push({ kind: "set", path: ["links", link, "shape", "line"], value: line.map((point) => point.map((part) => Number(part.toFixed(6)))) });
+      }
       store.edit(changes, { settled });
     } else if (own.kind === "force") {
       const to = own.at.map((part, a) => Number((part + held.move[a]).toFixed(2)));
@@ -207,21 +222,30 @@ export class Handles {
 
   // -- push ---
 
+  // On a link the pointer holds a point of it; elsewhere it pushes with the force of the curve.
   beginPush(event) {
     const { store, view } = this;
-    if (store.mode === "shape" || !store.curve()) return false;
-    this.pushed = { start: view.place(event), asked: null, force: 0 };
+    if (store.mode === "shape" || !store.curve() || !view.now) return false;
+    const start = view.place(event), held = view.grip(start);
+    this.pushed = { start, held, force: held ? Number(view.now.force.toPrecision(6)) : 0, by: [0, 0], asked: null };
     store.pushing = true;
+    if (held) this.ask(); // for the responses there
     return true;
   }
 
   push(event) {
-    const { store, view } = this, curve = store.project.curves[store.shown];
-    const force = store.project.forces.find((own) => own.name === curve.force), place = view.place(event);
-    const length = Math.hypot(...force.direction), reach = 0.3 * view.svg.getBoundingClientRect().height / view.scale;
-    const along = [0, 1].reduce((sum, a) => sum + (place[a] - this.pushed.start[a]) * force.direction[a] / length, 0);
-    const size = Math.min(Math.max(along / reach, -FARTHEST), FARTHEST) * Math.abs(curve.largest);
-    this.pushTo(size);
+    const { store, view, pushed } = this, curve = store.project.curves[store.shown], place = view.place(event);
+    const reach = 0.3 * view.svg.getBoundingClientRect().height / view.scale, move = place.map((part, a) => part - pushed.start[a]);
+    if (pushed.held) {
+      const size = Math.hypot(...move) / reach, scale = Math.abs(curve.largest) * Math.min(1, FARTHEST / size) / reach;
+      pushed.by = move.map((part) => part * scale || 0);
+      this.lean();
+      this.ask();
+      return;
+    }
+    const force = store.project.forces.find((own) => own.name === curve.force), length = Math.hypot(...force.direction);
+    const along = [0, 1].reduce((sum, a) => sum + move[a] * force.direction[a] / length, 0);
+    this.pushTo(Math.min(Math.max(along / reach, -FARTHEST), FARTHEST) * Math.abs(curve.largest));
   }
 
   // Right and up push more, left and down less, Escape lets go.
@@ -229,42 +253,66 @@ export class Handles {
     const { store } = this, by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
     if (event.target !== this.view.svg || store.mode !== "move" || !store.curve()) return;
     if (event.key === "Escape" && this.pushed) this.endPush();
-    if (!by) return;
+    if (!by || this.pushed && this.pushed.held) return;
     event.preventDefault();
     const { largest } = store.project.curves[store.shown], top = Math.abs(largest);
-    if (!this.pushed) { this.pushed = { asked: null, force: (this.view.now ? this.view.now.force : 0), key: true }; store.pushing = true; }
+    if (!this.pushed) { this.pushed = { held: null, by: [0, 0], asked: null, force: (this.view.now ? this.view.now.force : 0), key: true }; store.pushing = true; }
     this.pushTo(Math.min(Math.max(this.pushed.force + 0.05 * by * top, -FARTHEST * top), FARTHEST * top));
   }
 
   pushTo(size) {
-    const { store } = this, { points } = store.curve();
-    this.pushed.force = size;
+    const { store, pushed } = this, { points } = store.curve(), last = points.at(-1);
+    pushed.force = size;
     for (let k = 0; k + 1 < points.length; k++) {
       const [a, b] = [points[k].force, points[k + 1].force], t = (size - a) / (b - a);
       if (t >= 0 && t <= 1) {
-        store.pushed = null;
+        store.pushed = store.leaning = null;
         store.load = (k + t) / (points.length - 1);
         store.show();
         return;
       }
     }
+    const own = store.responses[store.shown], end = own && own.end;
+    if (!pushed.from && end && size * last.force > 0) { pushed.from = { state: last, rates: [end] }; store.pushed = last; }
+    this.lean();
     this.ask();
   }
 
-  // Beyond the curve the solver is asked, for one force at a time.
-  ask() {
-    const { store } = this, size = Number(this.pushed.force.toPrecision(4));
-    if (this.pushed.asked !== null || !size || size === this.pushed.last) return;
-    this.pushed.asked = this.pushed.last = size;
-    store.send({ kind: "push", curve: store.shown, force: size });
+  // The state under the present push by the responses of the one that was solved last, dashed.
+  lean() {
+    const { store, pushed } = this, { from } = pushed;
+    if (from && from.rates.length) {
+      const amounts = pushed.held ? pushed.by.map((part, a) => part - from.by[a]) : [pushed.force - from.state.force];
+      store.leaning = { state: from.state, rates: from.rates, amounts };
+    }
+    if (pushed.pending) return;
+    pushed.pending = true;
+    requestAnimationFrame(() => {
+      pushed.pending = false;
+      if (this.pushed !== pushed) return;
+      store.leans += 1;
+      if (store.pushed !== this.view.now) { store.show(); return; }
+      this.view.preview(); store.showState(); // the state is drawn
+    });
   }
 
-  answered(point) {
-    const { store } = this;
-    if (!this.pushed) return;
+  // The solver is asked for one push at a time.
+  ask() {
+    const { store, pushed } = this, [size, ...by] = [pushed.force, ...pushed.by].map((part) => Number(part.toPrecision(4)));
+    const message = { kind: "push", curve: store.shown, force: pushed.held ? pushed.force : size, ...pushed.held && { at: pushed.held.at, by } };
+    const key = JSON.stringify(message);
+    if (pushed.asked !== null || !pushed.held && !size || key === pushed.last) return;
+    pushed.asked = pushed.last = key;
+    store.send(message);
+  }
+
+  answered({ point, at, by, rates }) {
+    const { store, pushed } = this;
+    if (!pushed || JSON.stringify(at) !== JSON.stringify(pushed.held && pushed.held.at)) return;
     store.pushed = point;
-    this.pushed.asked = null;
-    store.show();
+    pushed.from = { state: point, rates, by };
+    pushed.asked = null;
+    this.lean();
     this.ask();
   }
 
@@ -277,8 +325,7 @@ export class Handles {
     if (this.pushed.last !== undefined) store.send({ kind: "release" });
     this.pushed = null;
     store.pushing = false;
-    store.pushed = null;
+    store.pushed = store.leaning = null;
     store.show();
   }
 }
-

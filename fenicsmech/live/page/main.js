@@ -4,7 +4,7 @@ import { listCarried } from "./carried.js";
 import { Chart } from "./chart.js";
 import { Handles } from "./handles.js";
 import { connect } from "./net.js";
-import { step } from "./preview.js";
+import { entryOf, nothing, step } from "./preview.js";
 import { Side } from "./side.js";
 import { Solid } from "./solid.js";
 import { figure } from "./svg.js";
@@ -13,8 +13,8 @@ import { View } from "./view.js";
 const $ = (id) => document.getElementById(id);
 
 const store = {
-  project: null, mesh: null, curves: {}, errors: {}, peaks: {}, linear: null, misfits: null, first: [],
-  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null,
+  project: null, mesh: null, curves: {}, errors: {}, peaks: {}, responses: {}, linear: null, misfits: null, first: [],
+  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null,
 
   curve() { return this.curves[this.shown]; },
   // The mesh of what is drawn: another curve may still be that of an earlier shape.
@@ -26,7 +26,33 @@ const store = {
     return this.first.find((own) => key(own.force, own) === now) || null;
   },
   // What a preview is a step from.
-  base() { return handles.held ? handles.held.linear : this.linear; },
+  base() { return handles.held ? handles.held.linear : this.turning ? this.turning.linear : this.linear; },
+  // A state with linear responses and amounts of these, which is drawn dashed; null if there is none.
+  lean() {
+    if (!this.turning) return this.leaning;
+    const { rest, rates } = this.turning, change = this.turn();
+    return rest && rates && change !== null ? { state: rest, rates: [rates], amounts: [change] } : null;
+  },
+  // How far the motor that is turned is from where its curve was solved.
+  turn() {
+    const { linear, motor, to } = this.turning, positions = linear && linear.positions[this.shown];
+    return positions ? to - (positions[motor] || 0) : null;
+  },
+  // Follows a motor that is being turned, from the last solve.
+  turnTo(motor, to) {
+    const now = this.turning && !this.turning.over ? this.turning : { linear: this.linear };
+    this.turning = { ...now, motor, to, over: false };
+    this.turned();
+  },
+  turned() {
+    const { linear, motor } = this.turning, own = this.curve(), found = this.responses[this.shown];
+    if (linear && own && linear.task === own.task) Object.assign(this.turning, { rest: own.points[0], rates: found && found.motors[motor] });
+    const entry = linear ? entryOf(linear, { kind: "motor", name: motor }) : -1;
+    this.previewed = entry < 0 ? null : nothing(linear);
+    if (this.previewed) this.previewed[entry] = this.turn();
+    chart.preview(); show();
+  },
+  stopTurning() { if (this.turning) this.turning.over = true; },
   // The targets, with the one that is dragged where the pointer has it.
   targets() {
     return this.project.targets.map((target, k) => this.drag && this.drag.index === k ? this.drag.target : target);
@@ -47,15 +73,17 @@ const store = {
   },
   send(message) { return send(message); },
   tell(text, error) { tell(text, error); },
+  fresh,
   show() { show(); },
+  showState() { showState(); },
   drawCurve() { chart.preview(); },
   listTargets() { listTargets(); },
 };
 
 const HINTS = {
-  move: "Drag a target ◆ on the curve, or choose Stiffer: the link changes its shape to follow. Or push the mechanism.",
+  move: "Drag a target ◆ on the curve, or choose Stiffer: the link changes its shape to follow. Or push it anywhere.",
   solid: "Turn the solid with the pointer or the arrow keys. Solve in 3D to see how far plane stress is from it.",
-  shape: "Drag control points ■, slopes ○ and thicknesses ◆: the dashed curve shows where it leads. Joints ● and the force ▲ are solved where they rest.",
+  shape: "Drag joints ●, control points ■, slopes ○ and thicknesses ◆: the dashed curve shows where it leads. The force ▲ is solved where it rests.",
 };
 
 const chart = new Chart($("chart"), store), view = new View($("view"), store);
@@ -68,17 +96,18 @@ const receivers = {
     const other = store.opened !== more.opened;
     store.project = project;
     Object.assign(store, more);
-    if (other) { store.curves = {}; store.errors = {}; store.peaks = {}; store.linear = null; store.solid = null; store.required = []; view.forced = true; }
+    if (other) { store.curves = {}; store.errors = {}; store.peaks = {}; store.responses = {}; store.turning = null; store.linear = null; store.solid = null; store.required = []; view.forced = true; }
     listCarried($("carried"), project, store.required);
     if (chart.held && !project.targets[chart.held.index]) { chart.held.sent = false; chart.release(true); } // it was removed elsewhere
     const added = project.curves.findIndex((own) => own.name === store.added);
     if (added >= 0) { store.shown = added; store.added = null; }
     store.shown = Math.min(store.shown, project.curves.length - 1);
     const forces = JSON.stringify(project.curves.map((own) => [own.force, own.positions]));
-    if (store.forces !== forces) { store.forces = forces; store.linear = null; store.previewed = null; }
+    if (store.forces !== forces) { store.forces = forces; store.linear = null; if (!store.turning) store.previewed = null; }
     for (const number of Object.keys(store.curves)) if (number >= project.curves.length) delete store.curves[number];
     $("name").textContent = project.name;
-    $("add-curve").disabled = project.curves.length >= store.most.curves;
+    $("add-curve").disabled = $("add-position").disabled = project.curves.length >= store.most.curves;
+    $("add-position").hidden = !project.motors.length;
     $("add").disabled = project.targets.length >= store.most.targets;
     $("undo").disabled = !undo; $("redo").disabled = !redo;
     tabs(); listTargets(); chart.draw(); side.draw();
@@ -109,8 +138,9 @@ const receivers = {
   curve(event) {
     store.curves[event.curve] = { ...event, mesh: store.mesh };
     delete store.errors[event.curve]; delete store.peaks[event.curve];
-    store.pushed = null;
-    if (!store.drag && !handles.held) store.previewed = null;
+    store.pushed = store.leaning = null;
+    if (store.turning && store.turning.over) store.turning = null;
+    if (!store.drag && !handles.held && !store.turning) store.previewed = null;
     store.stressTop = Math.max(...Object.values(store.curves).flatMap((own) => own.points.map((point) => point.stress)), 1e-9);
     $("scale-high").textContent = `${figure(store.stressTop)} MPa`;
     const { failed, remarks } = event;
@@ -119,6 +149,7 @@ const receivers = {
     remarks.forEach((remark) => tell(remark));
     view.fit(); show(); chart.draw(); listTargets();
   },
+  responses(event) { store.responses[event.curve] = event; },
   errors({ curve, errors, peak }) { store.errors[curve] = errors; store.peaks[curve] = peak; chart.draw(); listTargets(); },
   fitted({ misfits, missed, design }) {
     store.project.design = design;
@@ -136,7 +167,8 @@ const receivers = {
     store.active = event.active;
     if (!event.whole) tell("The linear preview ends where a curve snaps, ends or is unstable.");
     if (event.active.length) tell(`Held back by ${event.active.join(", ")}. Widen these bounds, or relax a target.`);
-    if (!store.drag && !handles.held) { store.previewed = null; chart.preview(); }
+    if (store.turning) { store.turning.linear = event; store.turned(); }
+    else if (!store.drag && !handles.held) { store.previewed = null; chart.preview(); }
     view.draw();
   },
   solid(event) {
@@ -154,7 +186,7 @@ const receivers = {
     document.body.dataset.solid = event.state;
     chart.draw(); show();
   },
-  pushed({ point, curve }) { if (curve === store.shown) handles.answered(point); },
+  pushed(event) { if (event.curve === store.shown) handles.answered(event); },
   failed({ part, problem, remedy }) { handles.failed(); tell(`${part}: ${problem}. ${remedy}.`, true); },
   done({ task }) {
     const own = store.curve();
@@ -300,10 +332,23 @@ const share = () => Math.min(Math.max(Number($("by").value) || 20, 1), 90) / 100
 $("stiffer").onclick = () => stiffen(1 + share());
 $("softer").onclick = () => stiffen(1 - share());
 
+// A name that none of some parts has.
+function fresh(stem, taken) {
+  let k = taken.length + 1;
+  while (taken.some((own) => own.name === `${stem} ${k}`)) k++;
+  return `${stem} ${k}`;
+}
+
+// A curve of the shown one's force, with the motors elsewhere.
+$("add-position").onclick = () => {
+  const { curves, motors, joints } = store.project, shown = curves[store.shown], [motor] = motors, name = fresh("curve", curves);
+  const by = joints.find((own) => own.name === motor.joint).kind === "prismatic" ? 1 : 0.2, positions = { ...shown.positions, [motor.name]: Number(((shown.positions[motor.name] || 0) + by).toFixed(4)) };
+  store.added = name;
+  store.edit([{ kind: "insert", path: ["curves", curves.length], value: { ...shown, name, positions } }]);
+};
 // A curve like the shown one, of a force of its own, turned by 45°: its point and direction are dragged in Shape.
 $("add-curve").onclick = () => {
   const { curves, forces } = store.project, shown = curves[store.shown], like = forces.find((own) => own.name === shown.force);
-  const fresh = (stem, taken) => { let k = taken.length + 1; while (taken.some((own) => own.name === `${stem} ${k}`)) k++; return `${stem} ${k}`; };
   const name = fresh("force", forces), curve = fresh("curve", curves), [a, b] = like.direction;
   store.added = curve; // it is shown when the server has it
   store.edit([{ kind: "insert", path: ["forces", forces.length], value: { ...like, name, direction: [0.7 * (a - b), 0.7 * (a + b)].map((part) => Number(part.toFixed(4))) } },
@@ -340,10 +385,16 @@ function showPlaying() {
 function show() {
   if (store.mode === "solid") solid.draw(); else view.draw();
   chart.mark(store.load);
-  const state = store.mode === "solid" ? solid.now : view.now;
   compareSolid();
+  showState();
+}
+
+// The load of what is drawn.
+function showState() {
+  const state = store.mode === "solid" ? solid.now : view.now, held = handles.pushed && handles.pushed.held;
   if (!state) return;
-  $("at").textContent = `${figure(state.force, 2)} N, ${figure(state.displacement, 3)} mm`;
+  const pull = held ? `, pushed by ${figure(Math.hypot(...handles.pushed.by), 2)} N` : "";
+  $("at").textContent = `${figure(state.force, 2)} N, ${figure(state.displacement, 3)} mm${pull}`;
 }
 
 // What 3D says beside plane stress, at the largest force that both reach.
@@ -363,7 +414,7 @@ function animate(now) {
   if (store.busy && now - last < 50) return; // the solver shares the processors
   const passed = Math.min(now - last, 100);
   last = now;
-  if (playing && store.mesh && store.curve() && !document.hidden && store.mode !== "shape" && !store.pushing && !store.drag) {
+  if (playing && store.mesh && store.curve() && !document.hidden && store.mode !== "shape" && !store.pushing && !store.drag && !store.turning) {
     phase = (phase + passed / 4200) % 1;
     store.load = 0.5 - 0.5 * Math.cos(2 * Math.PI * phase);
     $("load").value = store.load;

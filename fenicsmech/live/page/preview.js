@@ -1,10 +1,21 @@
 // The linear preview: Q(p + s) ≈ Q + e + J s near the last solved design, and the Gauss–Newton step s for moved targets
 //
 //   min over s   Σ ½ w (Q + e + J s − wanted)² / scale² + gᵀ s + ½ sᵀ H s + ½ μ |s / ℓ|²,   s within bounds of thickness.
+//
+// After the parameters, s has how far joints and motors are moved, which are as drawn in that step.
 
 import { dot, solve } from "./algebra.js";
 
 const DAMPING = 1e-4;
+
+// The step of no gesture.
+export const nothing = (linear) => new Array(linear.lengths.length + linear.moves.length).fill(0);
+
+// The entry of s of a joint along an axis, or of a motor; −1 if there is none.
+export function entryOf(linear, wanted) {
+  const key = JSON.stringify(wanted), k = linear.moves.findIndex((own) => JSON.stringify(own) === key);
+  return k < 0 ? -1 : linear.lengths.length + k;
+}
 
 // Value and derivatives of a curve at a force between those of its frames.
 function row(curve, force, size) {
@@ -54,7 +65,7 @@ export function step(linear, project) {
     if (!x) return null;
     const beyond = free.filter((k, i) => x[i] < low[k] || x[i] > high[k]);
     if (!beyond.length || round === 5) {
-      const s = new Array(n).fill(0);
+      const s = nothing(linear);
       free.forEach((k, i) => { s[k] = Math.min(Math.max(x[i], low[k]), high[k]); });
       held.forEach((value, k) => { s[k] = value; });
       return s;
@@ -73,9 +84,43 @@ export function curveAfter(linear, number, s) {
 // Control points of a link after a step.
 export function controlsAfter(link, s) {
   return link.controls.map((point, k) => point.map((part, m) => part.map((value, a) => {
-    const entry = link.entries[k][m][a];
-    return entry < 0 ? value : value + s[entry];
+    const entry = link.entries[k][m][a], follows = link.follows[k][m][a], moved = s.slice(s.length - follows.length);
+    return value + (entry < 0 ? 0 : s[entry]) + dot(follows, moved);
   })));
+}
+
+// The centreline of a strip whose joints at some places are shifted: shifts between joints are linear in its length.
+export function lineAfter(line, places, shifts) {
+  const lengths = [0];
+  for (let k = 1; k < line.length; k++) lengths.push(lengths[k - 1] + Math.hypot(line[k][0] - line[k - 1][0], line[k][1] - line[k - 1][1]));
+  const sites = places.map((place, n) => [lengthAt(line, lengths, place), shifts[n]]).sort((a, b) => a[0] - b[0]);
+  return line.map((point, k) => {
+    const next = sites.findIndex(([length]) => length >= lengths[k] - 1e-9);
+    if (next <= 0) { const shift = sites.at(next)[1]; return [point[0] + shift[0], point[1] + shift[1]]; } // before the first, after the last
+    const [[from, a], [to, b]] = [sites[next - 1], sites[next]], t = (lengths[k] - from) / (to - from);
+    return [0, 1].map((axis) => point[axis] + a[axis] + t * (b[axis] - a[axis]));
+  });
+}
+
+// The length along a line up to the point that is nearest to a place.
+function lengthAt(line, lengths, [x, y]) {
+  let least = Infinity, found = 0;
+  for (let k = 0; k + 1 < line.length; k++) {
+    const [[ax, ay], [bx, by]] = [line[k], line[k + 1]], size = lengths[k + 1] - lengths[k];
+    const t = Math.min(Math.max(((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / size ** 2, 0), 1);
+    const away = Math.hypot(ax + t * (bx - ax) - x, ay + t * (by - ay) - y);
+    if (away < least) { least = away; found = lengths[k] + t * size; }
+  }
+  return found;
+}
+
+// What is drawn of a state after some amounts of its linear responses.
+export function leaned({ state, rates, amounts }) {
+  const moved = (points, own) => points.map((point, k) => [0, 1].map((a) => point[a] + rates.reduce((sum, rate, j) => sum + amounts[j] * own(rate)[k][a], 0)));
+  return {
+    nodes: state.nodes.map((points, link) => moved(points, (rate) => rate.nodes[link])),
+    rigid: state.rigid.map((points, link) => moved(points, (rate) => rate.rigid[link])),
+  };
 }
 
 // The outline of a link from its control points: centreline and half of its thickness to both sides.

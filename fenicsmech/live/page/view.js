@@ -1,6 +1,6 @@
 // The mechanism in one state of its curve: links coloured by von Mises stress, rigid links, pins, and the force.
 
-import { controlsAfter, outline } from "./preview.js";
+import { controlsAfter, leaned, outline } from "./preview.js";
 import { make, path, set } from "./svg.js";
 
 export const HEAT = ["#fff3d6", "#fee6b8", "#fdd28a", "#fab45f", "#f6983f", "#e9762f", "#d9542b", "#bd3833", "#a01c3b", "#7e143d", "#5c0b3e"];
@@ -14,7 +14,8 @@ export class View {
       this.world.append(layer);
       return [name, layer];
     }));
-    svg.append(this.world);
+    this.note = make("text", { class: "preview-name", x: 6, y: 14 }, "– – linear preview");
+    svg.append(this.world, this.note);
     new ResizeObserver(() => { this.fit(); this.draw(); }).observe(svg);
   }
 
@@ -57,7 +58,7 @@ export class View {
     if (this.store.pushed) return this.store.pushed;
     const own = this.store.curve();
     if (!own || !own.points.length) return null;
-    const load = this.store.mode === "shape" || this.store.drag ? 0 : this.store.load; // at rest, as the preview is
+    const load = this.store.mode === "shape" || this.store.drag || this.store.turning ? 0 : this.store.load; // at rest, as the preview is
     const points = own.points, at = load * (points.length - 1), k = Math.min(Math.floor(at), Math.max(points.length - 2, 0));
     const a = points[k], b = points[Math.min(k + 1, points.length - 1)], t = at - k;
     const mixed = (p, q) => p.map((own, i) => [own[0] + t * (q[i][0] - own[0]), own[1] + t * (q[i][1] - own[1])]);
@@ -129,16 +130,74 @@ export class View {
     this.layers.force.replaceChildren(...parts);
   }
 
-  // The links at rest after the previewed step, dashed.
+  // Dashed: the links at rest after the previewed step, and the mechanism as it leans from a state.
   preview() {
-    const { store } = this, s = store.previewed, base = store.base(), parts = [];
-    if (s && base) for (const link of base.links) {
+    const { store } = this, s = store.previewed, base = store.base(), lean = store.lean(), parts = [], mesh = store.drawnMesh();
+    if (s && base && !lean) for (const link of base.links) {
       if (!link.thickness) continue;
       const d = path(outline(controlsAfter(link, s), link.thickness), true);
       parts.push(make("path", { class: "preview", d  }));
     }
+    if (lean && lean.state.nodes.length === mesh.flexible.length) {
+      const { nodes, rigid } = leaned(lean), rims = mesh.flexible.flatMap((link, k) => link.loops.map((loop) => path(loop.map((own) => nodes[k][own]), true)));
+      const bars = rigid.map((points, k) => mesh.rigid[k].fixed || points.length < 2 ? "" : path(order(points), points.length > 2));
+      parts.push(make("path", { class: "preview", d: [...rims, ...bars].join("") }), ...this.pull({ nodes, rigid }));
+    }
     this.layers.preview.replaceChildren(...parts);
+    this.note.style.display = parts.length ? "" : "none";
   }
+
+  // The link at a place of the present state, and its point that is there: a node, or shares along and across a rigid link.
+  grip(place) {
+    const { now } = this, mesh = this.store.drawnMesh(), near = 8 / this.scale, away = (points, k) => Math.hypot(points[k][0] - place[0], points[k][1] - place[1]);
+    for (let k = 0; k < mesh.flexible.length; k++) {
+      const points = now.nodes[k], node = nearest(points, place), { name, triangles } = mesh.flexible[k];
+      if (away(points, node) < near || triangles.some((own) => within(own.map((n) => points[n]), place))) return { at: { link: name, place: rounded(points[node]) }, flexible: k, node };
+    }
+    for (let k = 0; k < mesh.rigid.length; k++) {
+      const points = now.rigid[k].length > 2 ? order(now.rigid[k]) : now.rigid[k], { name, fixed } = mesh.rigid[k];
+      const on = points.some((point, j) => distance(place, point, points[(j + 1) % points.length]) < 0.5 * mesh.width + near);
+      if (!fixed && points.length && on) return { at: { link: name, place: rounded(place) }, rigid: k, shares: shares(now.rigid[k], place) };
+    }
+    return null;
+  }
+
+  // The force of the pointer at the point that it holds, in a leaned state.
+  pull({ nodes, rigid }) {
+    const { pushed } = this.handles;
+    if (!pushed || !pushed.held) return [];
+    const { held, by } = pushed, [x, y] = held.node === undefined ? shared(rigid[held.rigid], held.shares) : nodes[held.flexible][held.node];
+    const largest = Math.abs(this.store.project.curves[this.store.shown].largest), size = 70 / this.scale / largest;
+    const long = size * Math.hypot(...by), head = Math.min(9 / this.scale, 0.6 * long), [a, b] = by.map((part) => part * size / (long || 1)), [tipX, tipY] = [x + long * a, y + long * b];
+    const wings = [1, -1].map((side) => [tipX - head * (1.4 * a + 0.6 * side * b), tipY - head * (1.4 * b - 0.6 * side * a)]);
+    return [make("path", { class: "pull", d: path([[x, y], [tipX - head * a, tipY - head * b]]), "stroke-width": 3 / this.scale }),
+      make("path", { class: "pull-point", d: path([[tipX, tipY], ...wings], true) }), make("circle", { class: "pull-point", cx: x, cy: y, r: 5 / this.scale })];
+  }
+}
+
+const rounded = (place) => place.map((part) => Number(part.toPrecision(6)));
+
+// Whether a place is in a triangle.
+function within([a, b, c], p) {
+  const side = (s, t) => (t[0] - s[0]) * (p[1] - s[1]) - (t[1] - s[1]) * (p[0] - s[0]), sides = [side(a, b), side(b, c), side(c, a)];
+  return sides.every((own) => own >= 0) || sides.every((own) => own <= 0);
+}
+
+// Of a place from a segment.
+function distance([x, y], [ax, ay], [bx, by]) {
+  const square = (bx - ax) ** 2 + (by - ay) ** 2, t = square ? Math.min(Math.max(((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / square, 0), 1) : 0;
+  return Math.hypot(ax + t * (bx - ax) - x, ay + t * (by - ay) - y);
+}
+
+// Shares of a place along and across the line from the first of some points to the farthest from it, and back.
+function shares(points, [x, y]) {
+  const [a] = points, far = points.reduce((best, own) => Math.hypot(own[0] - a[0], own[1] - a[1]) > Math.hypot(best[0] - a[0], best[1] - a[1]) ? own : best, a);
+  const [dx, dy] = [far[0] - a[0], far[1] - a[1]], square = dx * dx + dy * dy || 1, [px, py] = [x - a[0], y - a[1]];
+  return { far: points.indexOf(far), along: (px * dx + py * dy) / square, across: (py * dx - px * dy) / square };
+}
+function shared(points, { far, along, across }) {
+  const [a, b] = [points[0], points[far]], [dx, dy] = [b[0] - a[0], b[1] - a[1]];
+  return [a[0] + along * dx - across * dy, a[1] + along * dy + across * dx];
 }
 
 // The number of the point that is nearest to a place.
