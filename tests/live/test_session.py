@@ -58,7 +58,7 @@ def test_examples_are_projects_that_survive_their_file(name, tmp_path):
         (["curves", 0, "others"], {"nobody": 0.1}, "curves[0].others"),
         (["links", 4, "material"], {"name": "own", "E": -1.0, "nu": 0.3, "density": None}, "material.E"),
         (["links", 4, "material"], {"name": "own", "E": 2.0, "nu": 0.5, "density": None}, "material.nu"),
-        (["links", 4, "design"], {"segments": 9, "thickness": None}, "design.segments"),
+        (["links", 4, "design"], {"segments": 21, "thickness": None}, "design.segments"),
         (["effects"], [{"kind": "joint spring", "joint": "nobody", "stiffness": 1.0, "rest": 0}], "effects[0].joint"),
         (["effects"], [{"kind": "joint spring", "joint": "foot", "stiffness": 0.0, "rest": 0}], "effects[0].stiffness"),
         (["targets", 0, "force"], -0.1, "targets[0].force"),
