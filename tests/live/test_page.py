@@ -367,7 +367,7 @@ def test_keys_move_add_and_remove_targets_joints_and_pushes(page):
     page.until("!live.store.pushing")
     choose(page, "shape")
     page.run("document.querySelectorAll('.handle.force')[0].focus()")
-    page.chrome.switch_to.active_element.send_keys(Keys.ARROW_UP)
+    ActionChains(page.chrome).send_keys(Keys.ARROW_UP).perform()  # to what has the focus, drawn anew or not
     page.until("live.store.project.forces[0].at[1] > 70")
     page.until("document.activeElement.matches('.handle.force')", 20)  # keys go on with it
     labelled = (

@@ -83,7 +83,7 @@ const store = {
 const HINTS = {
   move: "Drag a target ◆ on the curve, or choose Stiffer: the link changes its shape to follow. Or push it anywhere.",
   solid: "Turn the solid with the pointer or the arrow keys. Solve in 3D to see how far plane stress is from it.",
-  shape: "Drag joints ●, control points ■, slopes ○ and thicknesses ◆: the dashed curve shows where it leads. The force ▲ is solved where it rests.",
+  shape: "Drag joints ●, points ■, slopes ○, thicknesses ◆: dashed is where it leads. The force ▲ is solved at rests.",
 };
 
 const chart = new Chart($("chart"), store), view = new View($("view"), store);
