@@ -25,16 +25,18 @@ the same on all processes and machines, and not by time:
        beyond a dead centre
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
        may have left at a corner
-    11. of constant loads: the path by arc length from half    ``LoadSteps.arc_steps``
+    11. of motors: descent to an equilibrium after a snap,     seven solves, ``LoadSteps.snap_iterations`` times as
+       and load steps from there                              long, and as these
+    12. of constant loads: the path by arc length from half    ``LoadSteps.arc_steps``
        of those reached, past its turns, to the first
        stable equilibrium under all
-    12. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
+    13. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
        which they balance with springs; first of all where
        these are softer than the rounding of stiff links
-    13. of curves that have snapped: load steps from rest to    as these
+    14. of curves that have snapped: load steps from rest to    as these
        the value, whose path may go on where that snapped
        to ends
-    14. of forces beside large reactions: one solve to a       as one solve
+    15. of forces beside large reactions: one solve to a       as one solve
        smaller residual, where motions that deform no link
        are out of balance
 
@@ -96,6 +98,7 @@ class LoadSteps:
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
             forces hold zero-energy modes with a smaller stiffness.
         arc_steps: most arc-length steps of motors, and of constant loads.
+        snap_iterations: most iterations of one solve for where motors snap to, over the solver's: descent leads far.
 
     Raises:
         DescriptionError: a number is not positive, a factor is negative, or the number of iterations not whole.
@@ -117,9 +120,10 @@ class LoadSteps:
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
     arc_steps: int = 300
+    snap_iterations: int = 4
 
     def __post_init__(self) -> None:
-        set_options(self, "load steps", failures=1, iterations=1, arc_steps=1)
+        set_options(self, "load steps", failures=1, iterations=1, arc_steps=1, snap_iterations=1)
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 

@@ -30,6 +30,7 @@ from fenicsmech.equilibrium import (
     LoadFactorControl,
     MotorControl,
     NotConverged,
+    PrimalDualNewton,
     State,
     Unknown,
     joint_reactions,
@@ -356,11 +357,50 @@ class CurveStepper:
                     self.solver, first.state, control.at(1.0), ArcSteps(), most=LoadSteps().arc_steps
                 )
             except NotConverged:
-                raise self._unposed(failure, fraction, wound) from failure
-            _log.info("%s: load steps left the path of the motors, which is followed by arc length", self.request.where)
-            state, self._effort = point.state, self._effort + Effort(first.iterations + iterations)
+                if (found := self._snapped(failure, control)) is None:
+                    raise self._unposed(failure, fraction, wound) from failure
+                state = found
+            else:
+                _log.info(
+                    "%s: load steps left the path of the motors, which is followed by arc length", self.request.where
+                )
+                state, self._effort = point.state, self._effort + Effort(first.iterations + iterations)
         self._effort += Effort(stepper.iterations, stepper.snaps)
         return state
+
+    def _snapped(self, failure: LoadStepsFailed, control: MotorControl) -> State | None:
+        """The equilibrium at the end of the motors' way after a snap where load steps ended; None if none is found.
+
+        The mechanism snaps to where descent, by steps that turn links, leads from the last equilibrium, with motors as
+        little farther as it takes to find one: by 1/64 of the way left, 1/32, …, all of it. From there load steps go
+        on.
+        """
+        solver = self.solver.turning
+        if failure.last is None or solver is None or not isinstance(solver.options, PrimalDualNewton):
+            return None
+        most = LoadSteps().snap_iterations * solver.options.iterations
+        solver.options = replace(solver.options, iterations=most)
+        start, reached, iterations = replace(failure.last.state, unstable=False), failure.reached, 0
+        for share in 0.5 ** np.arange(6, -1, -1):
+            beyond = control.at(reached + float(share) * (1.0 - reached))
+            try:
+                point = solver.solve(start, beyond)
+            except NotConverged as failed:
+                iterations += failed.iterations
+                continue
+            if point.unstable_modes:
+                continue
+            stepper = DeadCentreStepper(self.solver, point.state, beyond, predictor=self.discretisation.predictor)
+            try:
+                state = stepper.advance(control.at(1.0)).state
+            except LoadStepsFailed:
+                continue
+            finally:
+                iterations += point.iterations + stepper.iterations
+            _log.warning("%s: the path of the motors turns back; curves start after a snap", self.request.where)
+            self._effort += Effort(iterations, 1)
+            return state
+        return None
 
     def _unposed(self, failure: LoadStepsFailed, fraction: float, wound: bool) -> EquilibriumError:
         """The error that motors do not reach the configuration, from the ``fraction`` on that links assemble to."""

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fenicsmech as fm
+from fenicsmech.mechanism import Force
 
 from ..equilibrium import toggle
 from ..equilibrium.curved_beam import RISE, beam_forces, curved_beam
@@ -25,20 +26,36 @@ def test_curve_that_ends_where_the_displacement_turns_back_says_where_and_names_
     assert float(found) == pytest.approx(fold, rel=1e-3)
 
 
-def test_motors_that_end_where_their_path_turns_back_are_said_to_with_their_position_there():
+def driven_toggle(iterations: int) -> tuple[fm.Simulation, fm.Configuration, Force]:
+    """A toggle whose head a motor moves beyond the fold of its path, a solver with few iterations, and a force."""
     case = toggle.toggle(stilt_modulus=0.075)
     mechanism = case.simulation.scene.mechanism
     (guide,) = (joint for joint in mechanism.joints if joint.b.name == "head" and joint.kind.sliding)
     motor = mechanism.motor(guide)
-    # iterations that suffice along the path, but not for the snap beyond its fold
-    options = {"space": "plane-stress", "order": 1, "size": 6.0, "solver": fm.PrimalDualNewton(iterations=4)}
+    options = {"space": "plane-stress", "order": 1, "size": 6.0, "solver": fm.PrimalDualNewton(iterations=iterations)}
     simulation = fm.Simulation(case.simulation.scene, **options)
+    return simulation, simulation.scene.configuration("driven", {motor: -5.8}), case.push
+
+
+def test_motors_that_end_where_their_path_turns_back_are_said_to_with_their_position_there():
+    simulation, driven, push = driven_toggle(25)
+    ((motor, _),) = driven.positions
     fold = simulation.follow(motor, until=fm.Until(position=-6.0, frames=30)).turning_points[0].frame.displacement
-    driven = simulation.scene.configuration("driven", {motor: -5.8})
+    # iterations that suffice along the path, but not for the snap beyond its fold
+    simulation, driven, push = driven_toggle(1)
     with pytest.raises(fm.EquilibriumError, match=r"before the turn, which follow\(\) goes round") as caught:
-        simulation.load_displacement(case.push, forces=[0.0], configuration=driven)
+        simulation.load_displacement(push, forces=[0.0], configuration=driven)
     (found,) = re.findall("the path turns back near '.*' at (-[0-9.]+);", str(caught.value))
     assert float(found) == pytest.approx(fold, rel=1e-3)
+
+
+def test_motors_snap_to_the_same_equilibrium_by_few_iterations_at_a_time():
+    frames = []
+    for iterations in (3, 25):  # three end load steps where the path turns back
+        simulation, driven, push = driven_toggle(iterations)
+        frames += simulation.load_displacement(push, forces=[0.0], configuration=driven).frames
+    assert [(frame.snapped_through, frame.unstable_modes) for frame in frames] == [(True, 0)] * 2
+    assert frames[0].strain_energy == pytest.approx(frames[1].strain_energy, rel=1e-8)
 
 
 def test_path_beside_an_imperfect_bifurcation_turns_into_the_next_mode_as_a_beam_does():
