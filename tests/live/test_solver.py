@@ -307,7 +307,18 @@ def test_a_solve_whose_time_is_over_keeps_the_last_iterate_and_tells_its_reason_
     assert failed["part"] == "time limit" and "longer than 600 s" in failed["problem"]
     assert "larger elements" in failed["remedy"]
     events.clear()
-    solver.run({"task": 2, "kind": "push", "curve": 0, "force": 0.2, "project": project, "fit": False})
+    solver.run(
+        {
+            "task": 2,
+            "kind": "push",
+            "curve": 0,
+            "force": 0.2,
+            "at": None,
+            "by": [0.0, 0.0],
+            "project": project,
+            "fit": False,
+        }
+    )
     assert events[-1]["event"] == "done"
 
 
