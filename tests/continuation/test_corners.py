@@ -52,6 +52,11 @@ class Plate:
     def difference(self, later: State, earlier: State) -> Step:
         return Step(later.u - earlier.u, np.zeros(0), np.zeros(0), later.force - earlier.force)
 
+    settled_difference = difference  # no link spins
+
+    def settled(self, step: Step, state: State) -> Step:
+        return step
+
     def moved(self, state: State, step: Step) -> State:
         return State(state.u + step.u, state.poses, state.multipliers, state.force + step.force, state.motors)
 
