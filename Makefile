@@ -69,7 +69,7 @@ lint: install-test ## style, types and layering: seconds
 	$(PYTHON) -m pytest -q tests/test_layering.py
 
 # Two processes side by side, half of the tests each; the one that is done first takes over tests of the other. What is
-# marked `parallel` runs on ranks instead, and on one process in `make test-thorough` unless it is thorough too.
+# marked `parallel` runs on ranks instead.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5
 SERIAL = $(PYTEST) -n 2 --dist worksteal --ignore tests/test_layering.py
 TESTS := tests
@@ -82,9 +82,9 @@ test-parallel: install-test ## the fast tests marked `parallel`, on two MPI rank
 	$(call heading,tests on $(RANKS) ranks)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and not thorough and $(SELECT)" $(TESTS)
 
-test-thorough: install-test ## those marked `thorough`, on ranks if `parallel` too; the other parallel ones on one process
+test-thorough: install-test ## those marked `thorough`, on ranks if they are `parallel` too
 	$(call heading,thorough tests)
-	$(SERIAL) -m "(parallel and not thorough or thorough and not parallel) and $(SELECT)" $(TESTS)
+	$(SERIAL) -m "thorough and not parallel and $(SELECT)" $(TESTS)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and thorough and $(SELECT)" $(TESTS)
 	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider tests/simulation/test_ranks.py
 

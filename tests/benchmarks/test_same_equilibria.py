@@ -21,6 +21,9 @@ SOLVERS = {
     **{f"SNES {kind.value}": SNES(globalisation=kind) for kind in Globalisation},
 }
 each_solver = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+each_method = pytest.mark.parametrize(
+    "solver", [AugmentedLagrangian(), KKTNewton(), SNES()], ids=lambda own: type(own).__name__
+)
 
 
 def assert_alike(solver: EquilibriumMethod, space: str, samples: dict, **options) -> None:
@@ -69,7 +72,7 @@ def test_joints_with_compliance(solver):
 
 
 @pytest.mark.thorough
-@each_solver
+@each_method
 @pytest.mark.parametrize(
     # the legs let the force go 62 forth and 102 back; whatever its size, dead force has an equilibrium along them
     "control",
@@ -85,7 +88,7 @@ def test_values_out_of_reach_are_refused_in_one_solve(solver, control):
 
 
 @pytest.mark.thorough
-@each_solver
+@each_method
 def test_start_with_inverted_elements_is_refused(solver):
     simulation, push = finger("plane-stress", solver=solver)
     rest = simulation.load_displacement(push, forces=[0.0]).frames[0].state
@@ -95,7 +98,7 @@ def test_start_with_inverted_elements_is_refused(solver):
 
 
 @pytest.mark.thorough
-@each_solver
+@each_method
 def test_failure_of_a_curve_is_an_error_with_the_frames_before(solver):
     simulation, push = finger("plane-stress", solver=solver)
     with pytest.raises(fm.EquilibriumError) as caught:

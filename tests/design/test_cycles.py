@@ -65,9 +65,8 @@ def test_life_between_samples_is_that_between_frames():
     assert true == pytest.approx([turned], rel=1e-9)
 
 
-@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
-def test_derivatives_add_up_over_both_samples(space):
-    case, simulation = arm(space=space)
+def test_derivatives_add_up_over_both_samples():
+    case, simulation = arm()
     own = bench(case, simulation)
     p = own.design()
     placed = own.rest.place(own.rest.initial, None)

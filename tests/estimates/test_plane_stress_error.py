@@ -105,7 +105,7 @@ def test_estimate_finds_how_much_stiffer_wide_thin_strips_are_in_space(depth, le
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("along", [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0, 1.0)])
+@pytest.mark.parametrize("along", [(0.0, 1.0), (0.0, 0.0, 1.0)])
 def test_estimate_finds_how_much_stiffer_wide_strips_of_fibres_are_in_space(along):
     scene, push, load = strip(10.0, 10.0, law=fm.TransverselyIsotropic(3000.0, 1000.0, 0.3, 0.5, 300.0, along=along))
     flat = fm.Simulation(scene, space="plane-stress", size=2.0)
@@ -127,7 +127,7 @@ def test_any_number_of_ranks_estimates_the_same_of_fibres():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("depth", [1.0, 3.0, 10.0, 30.0])
+@pytest.mark.parametrize("depth", [1.0, 10.0])
 @pytest.mark.parametrize(
     ("length", "options"),
     [(10.0, {}), (30.0, {"poisson": 0.3}), (30.0, {"turn": 0.5 * pi}), (30.0, {"turn": pi / 3.0, "pinned": True})],

@@ -88,12 +88,11 @@ def assert_alike(whole: fm.Frame, half: fm.Frame, *, digits: float = 1e-9) -> No
     [
         (arch, 1, 2.0, [15.0, -15.0], 0.0),
         (arch, 2, 2.0, [15.0, 60.0], 0.0),
-        (arch, 3, 2.0, [15.0], 0.0),
         (pushed_arch, 2, 2.0, [30.0, 90.0], 0.0),
         (four_bar, 2, 3.0, [0.5, 1.0], 0.1),
         (lambda: describe("claw"), 1, 2.125, [5.0, 10.0], -0.1),
     ],
-    ids=["arch P1", "arch P2", "arch P3", "force on the arch", "four-bar", "claw"],
+    ids=["arch P1", "arch P2", "force on the arch", "four-bar", "claw"],
 )
 def test_half_and_mirrored_mesh_give_the_same_frames(build, order, size, forces, position):
     curves, estimates = [], []
@@ -114,13 +113,11 @@ EFFECTS = {
     "contact at points": lambda bow, slide, hinge: [
         Contact(slide, Cylinder((38.0, -3.0), 4.0), stiffness=2.0, points=[(39, 0)])
     ],
-    "pressure all around": lambda bow, slide, hinge: [Pressure(bow, 0.1)],
     "pressure from one side": lambda bow, slide, hinge: [
         Pressure(bow, 0.01, where=lambda x: x[:, 1] > 7.0, about=(20, 0))
     ],
     "spring": lambda bow, slide, hinge: [JointSpring(hinge, 20.0, rest=0.1)],
     "compliance": lambda bow, slide, hinge: [JointCompliance(hinge, 0.5)],
-    "swelling": lambda bow, slide, hinge: [Prestrain(bow, 1.05)],
     "shrinking along the link": lambda bow, slide, hinge: [Prestrain(bow, 0.97, along=(1, 0))],
 }
 
