@@ -110,7 +110,8 @@ effectivity: install-test ## error estimates of 300 random scenes from seed 1600
 
 # What can differ between versions of dolfinx, PETSc, gmsh and Python; FULL=yes runs everything that is fast.
 FULL :=
-VERSION_TESTS := tests/elasticity tests/joints tests/multibody tests/mechanism tests/meshing \
+VERSION_TESTS := tests/meshing $(patsubst %,tests/elasticity/test_%.py,body carried derivatives mixed_derivatives patch) \
+    $(patsubst %,tests/mechanism/test_%.py,cards purity) tests/joints/test_kinds.py tests/multibody/test_invariance.py \
     tests/quantities/test_sensitivity.py tests/design/test_weights.py \
     $(patsubst %,tests/test_%.py,collective compat kernel_cache uncaught_errors) \
     tests/effects/test_contact_derivatives.py \
