@@ -553,6 +553,8 @@ def motor_page(page):
 def test_the_slider_of_a_motor_is_the_same_while_it_is_dragged(motor_page):
     page, seen = motor_page, []
     slider = page.chrome.find_element(By.CSS_SELECTOR, "#side input[type=range]")
+    # what is told at the foot of the page takes room from the panel, which scrolls
+    page.chrome.execute_script("arguments[0].scrollIntoView({block: 'center'})", slider)
 
     def during():
         page.until("Object.values(live.store.project.curves[live.store.shown].positions).some(at => at)")
