@@ -15,9 +15,7 @@ TABLE = Path(__file__).parents[2] / "docs" / "tables" / "hard-cases.md"
 
 
 def _parameter(case: HardCase, space: str):
-    """A case on ranks in its first space and on one process in the others, as slow ones are in all."""
-    marks = [pytest.mark.slow] * case.slow + [pytest.mark.parallel] * (space == case.spaces[0])
-    return pytest.param(case, space, id=f"{case.name}, {space}", marks=marks)
+    return pytest.param(case, space, id=f"{case.name}, {space}", marks=[pytest.mark.slow] * case.slow)
 
 
 @pytest.mark.thorough

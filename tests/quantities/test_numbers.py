@@ -13,8 +13,6 @@ from fenicsmech.quantities import Sensitivity
 
 from .test_sensitivity import Bench, assert_slopes
 
-pytestmark = pytest.mark.parallel
-
 
 def links(bench: Bench) -> list[fm.FlexibleLink]:
     return bench.simulation.scene.mechanism.flexible_links
@@ -46,7 +44,10 @@ CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symm
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(space, marks=() if space == "plane-stress" else pytest.mark.thorough) for space in CASES],
+    params=[
+        pytest.param(space, marks=pytest.mark.parallel if space == "plane-stress" else pytest.mark.thorough)
+        for space in CASES
+    ],
 )
 def bench(request) -> Bench:
     space, *more = request.param.split()
