@@ -22,22 +22,11 @@ def _restore_interrupts(handler: Callable[[int, FrameType | None], Any] | int | 
         signal.signal(signal.SIGINT, handler)
 
 
-class _Gmsh:
-    """The package gmsh, imported when it is first used: that takes a second, which programs that mesh nothing save.
+# gmsh takes Ctrl-C away from Python, some versions even on import: keep Python's handler throughout
+_handler = signal.getsignal(signal.SIGINT)
+import gmsh  # noqa: E402
 
-    It takes Ctrl-C away from Python, some versions even on import: Python's handler is kept throughout.
-    """
-
-    def __getattr__(self, name: str) -> Any:
-        handler = signal.getsignal(signal.SIGINT)
-        import gmsh
-
-        _restore_interrupts(handler)
-        vars(self).update(vars(gmsh))
-        return getattr(gmsh, name)
-
-
-gmsh: Any = _Gmsh()
+_restore_interrupts(_handler)
 
 __all__ = ["gmsh", "gmsh_session", "muted_output"]
 
