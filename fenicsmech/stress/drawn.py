@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenicsmech.stress.recovered import undeformed
+from fenicsmech.stress.recovered import FittedFields, fitted_parts, square, symmetric
 from fenicsmech.stress.recovery import PatchRecovery, with_image
 
 
@@ -48,14 +48,11 @@ class SurfaceFit:
         """
         dim, whole = self.rows.shape[-1], with_image(samples) if self.half else samples
         own = whole[self.cells]
-        stress, F = _square(own[..., :9]), _square(own[..., 9 : 9 + dim**2])
-        T = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.solve(F, stress[..., :dim, :dim]), -1, -2)
-        across = stress[..., 2, 2, None]
-        rest = undeformed(own.shape[-1], dim)
-        fits = self.recovery.fit(T, np.concatenate([across, own[..., 9:] - rest], axis=2))
+        T, others = fitted_parts(own, dim)
+        fits = self.recovery.fit(T, others)
         found = np.concatenate([self._at(part.reshape(*part.shape[:2], -1)) for part in fits], axis=2)
-        found[..., dim**2 + 1 :] += rest
-        return FittedStress(self, samples.shape, T, F, np.delete(found, dim**2, axis=2), found[..., dim**2])
+        sampled = T, square(own[..., 9 : 9 + dim**2])
+        return FittedStress(self, samples.shape, sampled, FittedFields.of(found, dim))
 
     def _at(self, coefficients: np.ndarray) -> np.ndarray:
         return np.einsum("fcpm,fcmr->fpr", self.shares, coefficients[self.rows], optimize=True)
@@ -79,35 +76,22 @@ class FittedStress:
     """
 
     def __init__(
-        self,
-        fit: SurfaceFit,
-        shape: tuple[int, ...],
-        T: np.ndarray,
-        F: np.ndarray,
-        found: np.ndarray,
-        across: np.ndarray,
+        self, fit: SurfaceFit, shape: tuple[int, ...], sampled: tuple[np.ndarray, np.ndarray], fields: FittedFields
     ) -> None:
-        dim = F.shape[-1]
-        self._fit, self._shape, self._sampled = fit, shape, (T, F)
-        T, F, *elastic = (_square(own) for own in np.split(found, found.shape[-1] // dim**2, axis=2))
-        self._fitted, self.F = T, F
-        plane = T @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None]
-        self.stress = np.zeros((*found.shape[:2], 3, 3))
-        self.stress[..., 2, 2] = across
-        self.stress[..., :dim, :dim] = _symmetric(plane)
-        self.elastic = elastic[0] if elastic else None
+        self._fit, self._shape, self._sampled, self._fitted = fit, shape, sampled, fields.T
+        self.stress, self.F, self.elastic = fields.stress, fields.F, fields.elastic
 
     def transposed(self, stress: np.ndarray, through_F: np.ndarray | float, elastic: np.ndarray | None) -> np.ndarray:
         """Derivatives by the samples, in their shape, from those by ``stress``, ``F`` and ``elastic``."""
         T, F, dim = self._fitted, self.F, self._sampled[0].shape[-1]
-        by_stress, J = _symmetric(stress[..., :dim, :dim]), np.linalg.det(F)[..., None, None]
+        by_stress, J = symmetric(stress[..., :dim, :dim]), np.linalg.det(F)[..., None, None]
         by_T = by_stress @ F / J
         traces = np.einsum("...ij,...ij->...", by_stress, self.stress[..., :dim, :dim])[..., None, None]
         by_F = through_F + by_stress @ T / J - traces * _inverse_transposed(F)
         across = stress[..., 2, 2, None] if dim == 2 else np.zeros((*stress.shape[:2], 1))
         others = [across, _flat(by_F), *([] if elastic is None else [_flat(elastic)])]
         fits = self._fit.transposed(_flat(by_T)), self._fit.transposed(np.concatenate(others, axis=2))
-        by_T, rest = self._fit.recovery.fit_transposed(_square(fits[0]), fits[1])
+        by_T, rest = self._fit.recovery.fit_transposed(square(fits[0]), fits[1])
         T, F = self._sampled
         J, back = np.linalg.det(F)[..., None, None], _inverse_transposed(F)
         sigma = np.zeros((*T.shape[:2], 3, 3))
@@ -125,19 +109,9 @@ class FittedStress:
         return found
 
 
-def _square(values: np.ndarray) -> np.ndarray:
-    """Square matrices from their entries, (…, n²)."""
-    size = round(values.shape[-1] ** 0.5)
-    return values.reshape(*values.shape[:-1], size, size)
-
-
 def _flat(values: np.ndarray) -> np.ndarray:
     """Entries of square matrices, (…, n²)."""
     return values.reshape(*values.shape[:-2], -1)
-
-
-def _symmetric(values: np.ndarray) -> np.ndarray:
-    return 0.5 * (values + np.swapaxes(values, -1, -2))
 
 
 def _inverse_transposed(F: np.ndarray) -> np.ndarray:

@@ -49,12 +49,64 @@ class Recovered:
         return principal_strain(self.elastic)
 
 
-def undeformed(size: int, dim: int) -> np.ndarray:
-    """F and, if it counts, its elastic part where nothing deforms, as in samples of ``size`` 9 + dim² or 9 + 2 dim².
+def fitted_parts(samples: np.ndarray, dim: int) -> tuple[np.ndarray, np.ndarray]:
+    """What polynomials are fitted to: T = J σ F⁻ᵀ, (…, dim, dim), and values that are free at boundaries, (…, r).
 
-    Fits take the difference from it: their ridge is small beside the values fitted, not beside strains of 1e-7.
+    Args:
+        samples: σ, F and, if it counts, the elastic part of F, (…, 9 + dim² or 9 + 2 dim²).
+        dim: of space.
     """
-    return np.tile(np.eye(dim).ravel(), (size - 9) // dim**2)
+    stress, F = square(samples[..., :9]), square(samples[..., 9 : 9 + dim**2])
+    T = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.solve(F, stress[..., :dim, :dim]), -1, -2)
+    # F − I: the ridge of the fits is small beside values, not beside strains of 1e-7
+    return T, np.concatenate(
+        [stress[..., 2, 2, None], samples[..., 9:] - _identities(samples.shape[-1] - 9, dim)], axis=-1
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FittedFields:
+    """What fits have at points.
+
+    Attributes:
+        T: fitted, (…, dim, dim).
+        F: fitted, (…, dim, dim).
+        elastic: its elastic part, likewise; None if not asked for.
+        stress: σ = T Fᵀ / det F, symmetric, (…, 3, 3).
+    """
+
+    T: np.ndarray
+    F: np.ndarray
+    elastic: np.ndarray | None
+    stress: np.ndarray
+
+    @classmethod
+    def of(cls, values: np.ndarray, dim: int) -> FittedFields:
+        """From fitted ``fitted_parts``, T before the others, (…, dim² + r)."""
+        across = values[..., dim**2]
+        parts = np.delete(values, dim**2, axis=-1)
+        parts[..., dim**2 :] += _identities(parts.shape[-1] - dim**2, dim)
+        T, F, *elastic = (square(own) for own in np.split(parts, parts.shape[-1] // dim**2, axis=-1))
+        stress = np.zeros((*across.shape, 3, 3))
+        stress[..., 2, 2] = across
+        stress[..., :dim, :dim] = symmetric(T @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None])
+        return cls(T, F, elastic[0] if elastic else None, stress)
+
+
+def _identities(size: int, dim: int) -> np.ndarray:
+    """Entries of as many identities as gradients have ``size`` entries."""
+    return np.tile(np.eye(dim).ravel(), size // dim**2)
+
+
+def square(values: np.ndarray) -> np.ndarray:
+    """Square matrices from their entries, (…, n²)."""
+    size = round(values.shape[-1] ** 0.5)
+    return values.reshape(*values.shape[:-1], size, size)
+
+
+def symmetric(values: np.ndarray) -> np.ndarray:
+    """The symmetric part of square matrices."""
+    return 0.5 * (values + np.swapaxes(values, -1, -2))
 
 
 def turned_back(stress: np.ndarray, F: np.ndarray) -> np.ndarray:

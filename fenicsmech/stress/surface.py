@@ -14,7 +14,15 @@ from fenicsmech.mechanism import Disc, Face, Force
 from fenicsmech.model import MechanismModel
 from fenicsmech.stress.drawn import SurfaceFit
 from fenicsmech.stress.interpolation import InterpolationError, InterpolationOptions, node_places
-from fenicsmech.stress.recovered import CellFields, Recovered, principal_strain, turned_back, undeformed, von_mises
+from fenicsmech.stress.recovered import (
+    CellFields,
+    FittedFields,
+    Recovered,
+    fitted_parts,
+    principal_strain,
+    turned_back,
+    von_mises,
+)
 from fenicsmech.stress.recovery import PatchRecovery, RecoveryOptions, Samples, shape_functions, with_image
 from fenicsmech.stress.recovery_error import HIGHER, SMOOTHER, recovery_error
 from fenicsmech.stress.singular_places import (
@@ -405,29 +413,11 @@ class LinkSurface:
         """Recovered fields at ``points`` (k, p, dim), where coefficients of fits ``rows`` (k, c) have ``shares``
         (k, c, p, m)."""
         dim = self._model.elastic.model.dim
-        values = samples[self._flexible]
-        stress, F = (
-            values[..., :9].reshape(*values.shape[:2], 3, 3),
-            values[..., 9 : 9 + dim**2].reshape(*values.shape[:2], dim, dim),
-        )
-        # T = J σ F⁻ᵀ
-        T = np.linalg.det(F)[..., None, None] * np.swapaxes(np.linalg.solve(F, stress[..., :dim, :dim]), -1, -2)
-        rest = undeformed(values.shape[-1], dim)
-        others = np.concatenate([stress[..., 2, 2, None], values[..., 9:] - rest], axis=2)
-        T, others = recovery.fit(T, others)
+        T, others = recovery.fit(*fitted_parts(samples[self._flexible], dim))
         coefficients = np.concatenate([T.reshape(*T.shape[:2], -1), others], axis=2)
         found = sum(shares[:, corner] @ coefficients[rows[:, corner]] for corner in range(rows.shape[1]))
-        found[..., dim * dim + 1 :] += rest
-        across = found[..., dim * dim]
-        T, F, *elastic = (
-            own.reshape(*own.shape[:2], dim, dim)
-            for own in np.split(np.delete(found, dim * dim, axis=2), found.shape[-1] // dim**2, axis=2)
-        )
-        plane = T @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None]
-        stress = np.zeros((*found.shape[:2], 3, 3))
-        stress[..., 2, 2] = across
-        stress[..., :dim, :dim] = 0.5 * (plane + np.swapaxes(plane, -1, -2))
-        return Recovered(points, stress, F, elastic[0] if elastic else None)
+        fields = FittedFields.of(found, dim)
+        return Recovered(points, fields.stress, fields.F, fields.elastic)
 
     @cached_property
     def _shares(self) -> np.ndarray:
