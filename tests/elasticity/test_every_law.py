@@ -26,17 +26,18 @@ STEPS = 10.0 ** -np.arange(2.0, 4.5, 0.5)
 GRADIENT = np.array([[0.2, 0.25, -0.1], [-0.15, -0.1, 0.2], [0.1, 0.15, 0.15]])
 
 
-def marked(model, law, mixed):
-    """Thorough but for displacements in plane strain, and slow with Ogden's law: what else there is compiles long."""
-    in_plane_strain, long = model is PLANE_STRAIN, name(law) == "Ogden"
-    marks = [] if in_plane_strain and not mixed and not long else [pytest.mark.thorough]
-    if long and not in_plane_strain:
-        marks = [pytest.mark.slow]
-    return pytest.param((model, law, mixed), id=f"{model.name}-{name(law)}{'-mixed' * mixed}", marks=marks)
+def cases(model, laws, mixed):
+    """Thorough but for displacements in plane strain: others compile long. Ogden's law, which compiles longest, is
+    there in plane strain alone; ``test_hand_curves`` has it in all models."""
+    for law in laws:
+        ogden = name(law) == "Ogden"
+        if model is PLANE_STRAIN or not ogden:
+            marks = [pytest.mark.thorough] * (model is not PLANE_STRAIN or mixed or ogden)
+            yield pytest.param((model, law, mixed), id=f"{model.name}-{name(law)}{'-mixed' * mixed}", marks=marks)
 
 
-CASES = [marked(model, law, False) for model in (PLANE_STRAIN, PLANE_STRESS, SPATIAL) for law in EXAMPLES]
-CASES += [marked(model, law, True) for model in (PLANE_STRAIN, SPATIAL) for law in NEARLY_INCOMPRESSIBLE]
+CASES = [case for model in (PLANE_STRAIN, PLANE_STRESS, SPATIAL) for case in cases(model, EXAMPLES, False)]
+CASES += [case for model in (PLANE_STRAIN, SPATIAL) for case in cases(model, NEARLY_INCOMPRESSIBLE, True)]
 
 
 @pytest.fixture(scope="module", params=CASES)
