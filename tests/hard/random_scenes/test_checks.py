@@ -101,9 +101,11 @@ def test_the_check_sees_a_hundredth_of_every_effect(space, order, effect, option
         assert unstable_directions(potential, frame) == frame.unstable_modes
 
 
-def test_loads_balance_with_tension_in_links_that_all_but_leave_them_free():
-    """Taut links in line turn by 1e-10 under a load of 2e-10 of their tension, which does all the work against it."""
-    scene, load = arch("plane-stress", 2, PrestrainPlan("right", 0.999, None)), 2e-9
+@pytest.mark.parametrize("pressures", [(), (PressurePlan("left", 5.0),), (PressurePlan("left", -5.0),)])
+def test_loads_balance_with_tension_in_links_that_all_but_leave_them_free(pressures):
+    """Taut links in line turn by 1e-10 under a load of 2e-10 of their tension, which does all the work against it, part
+    of it as pressure."""
+    scene, load = arch("plane-stress", 2, PrestrainPlan("right", 0.999, None), *pressures), 2e-9
     taut = [replace(link, centreline=tuple((x, 0.0) for x, _ in link.centreline)) for link in scene.links[1:]]
     joints = tuple(replace(joint, at=(joint.at[0], 0.0)) for joint in scene.joints)
     forces = (ForcePlan("load", "left", (30.0, 0.0), (0.0, -1.0)),)

@@ -91,9 +91,10 @@ def unstrained_work(
     """Largest work of all that acts along a motion that deforms no link, over loads and torques times velocities.
 
     Loads count with the velocity of what moves fastest: in a dead centre their own points stand still. Close to one
-    links are deformed a little, and their work counts. What rounding does to springs' coordinates is left out, what it
-    may do to the force where displacements are prescribed or followed to, which takes all that it leaves (``floor``),
-    and the work of the largest ``reaction`` where joints open by rounding.
+    links are deformed a little, and their work counts, with that of pressures, which as strain balance on each link:
+    what interfaces bear is the sum of both. What rounding does to springs' coordinates is left out, what it may do to
+    the force where displacements are prescribed or followed to, which takes all that it leaves (``floor``), and the
+    work of the largest ``reaction`` where joints open by rounding.
     """
     shares = []
     for motion in unstrained_motions(potential, u, places):
@@ -101,24 +102,31 @@ def unstrained_work(
         speeds = [np.abs(motion.du).max(), *(np.abs(body.shift.imag).max() for body in there)]
         speeds += [np.abs(body.turn.imag).max() * whole for body in there]
         fastest = float(max(speeds)) / STEP
-        work = float(np.imag(potential.strain_energy(potential.nodal(u, motion.deformed), p))) / STEP
+        along, deformed = potential.nodal(u + motion.du, there), potential.nodal(u, motion.deformed)
+        work = float(np.imag(potential.strain_energy(deformed, p))) / STEP
         size, grain = 0.0, reaction * (THRESHOLDS.opening * motion.opening + THRESHOLDS.rounded * fastest)
         for force, amount in potential.acting(magnitude):
-            work -= amount * float(np.imag(potential.travel(force, u + motion.du, there))) / STEP
+            work -= amount * float(np.imag(potential.travel(force, along, there))) / STEP
             size += abs(amount) * fastest
         if potential.blueprint.control != "forces":
             grain += THRESHOLDS.rounding * floor * fastest
         for plan in potential.blueprint.effects:
-            part = float(np.imag(potential.alone(plan).effect_energy(u + motion.du, there))) / STEP
+            pressure = isinstance(plan, PressurePlan)
+            at = deformed if pressure else along
+            part = float(np.imag(potential.alone(plan).effect_energy(at, there))) / STEP
             work += part
-            size += potential.weight * fastest if isinstance(plan, GravityPlan) else abs(part)
+            if not pressure:
+                size += potential.weight * fastest if isinstance(plan, GravityPlan) else abs(part)
             grain += _grain(potential, plan, places, there, fastest)
         shares.append(max(0.0, abs(work) - grain) / max(size, 1e-300))
     return max(shares, default=0.0)
 
 
 def _grain(potential: Potential, plan: EffectPlan, places: list[Place], there: list[Place], fastest: float) -> float:
-    """Work at the edge of rounding: of a spring, a compliant joint, or the nodal forces of a pressure, which cancel."""
+    """Work at the edge of rounding: of a spring, a compliant joint, or the nodal forces of a pressure, which cancel.
+
+    F = I + ∇u is rounded alike in all elements of a straight link, so that the errors of a pressure's forces add up.
+    """
     whole = potential.blueprint.length
     match plan:
         case SpringPlan(joint=name, stiffness=stiffness):
@@ -133,5 +141,5 @@ def _grain(potential: Potential, plan: EffectPlan, places: list[Place], there: l
         case PressurePlan(link=name, pressure=pressure):
             strip = potential.blueprint.link(name)
             around = 2.0 * abs(pressure) * strip.depth * length(strip)
-            return float(THRESHOLDS.rounding * 1e-16 * around * fastest)
+            return float(THRESHOLDS.rounding * np.finfo(float).eps * around * fastest)
     return 0.0
