@@ -216,20 +216,24 @@ class LoadStepper(Stepper):
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
+        # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
+        aside, halved = dict[float, EquilibriumPoint](), False
         while True:
             remaining = control.prescribed - self._value
             step = self._limited(step, distance)
             arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.prescribed if arrives else self._value + step
             try:
-                point = self._correct(self._guess(control.at(value)), control.at(value))
+                point = aside.pop(value, None) or self._correct(self._guess(control.at(value)), control.at(value))
                 snapped = self._snapped(point)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
-                    step, beyond = 0.5 * (value - self._value), point
+                    step, beyond, halved = 0.5 * (value - self._value), point, True
+                    if self.system.contact is not None:
+                        aside[value] = point
                     continue
             except NotConverged as failure:
                 tried.append(value)
-                failed += 1
+                failed, halved = failed + 1, True
                 step = 0.5 * (value - self._value)
                 if abs(step) > steps.smallest * self._scale(distance) and failed < steps.failures:
                     continue
@@ -248,11 +252,14 @@ class LoadStepper(Stepper):
                     self._value,
                     point.control.prescribed,
                 )
+            changed = bool(self._points) and self._others_touch(self._points[-1].touching, point.touching)
             self._accept_at(point)
             if self._value == control.prescribed:
                 return point
             failed, beyond = 0, None
-            if point.iterations <= steps.iterations:
+            if changed and not halved:
+                step = control.prescribed - self._value
+            elif point.iterations <= steps.iterations:
                 step *= 2.0
 
     @property
