@@ -95,6 +95,15 @@ class ActiveSet:
         """Expects the points that touch at the state that is next linearised; ``load_factor`` is that of the energy."""
         self._load_factor, self._expected = load_factor, None
 
+    def take_factor(self) -> None:
+        """Takes the factor at hand for that of the loaded state, with the points that touch there."""
+        self._hold(self.touching())
+
+    def _hold(self, active: np.ndarray) -> None:
+        """Takes A for that of a new matrix."""
+        self._active = active
+        self._corrected, self._columns, self._along = np.zeros(0, int), np.zeros((len(active), 0)), np.zeros(0)
+
     def touching(self) -> np.ndarray:
         """Whether each of this rank's points touches, at the loaded state. Local."""
         self._update()
@@ -116,8 +125,8 @@ class ActiveSet:
         ``matrix`` and leaves it unassembled. Local."""
         touching = self.touching()
         present = np.maximum(-self._gaps, 0.0) / self._compliances
-        self._active, pressures = (touching, present) if self._expected is None else self._expected
-        self._corrected, self._columns, self._along = np.zeros(0, int), np.zeros((len(touching), 0)), np.zeros(0)
+        active, pressures = (touching, present) if self._expected is None else self._expected
+        self._hold(active)
         stiffness = self._load_factor * (self._active * 1.0 - touching) / self._compliances
         pairs = zip(self._each(stiffness), self._each(self._load_factor * (pressures - present)), strict=True)
         for (surface, own), (_, pressure) in pairs:
