@@ -29,7 +29,8 @@ Close to convergence the factor of the KKT matrix K is reused (simplified Newton
 as long as corrections contract by a factor of 1000 or more; otherwise, for example near a limit point, K is factored
 again.
 
-Where links may touch obstacles a step linearises the gaps and finds the points that touch (see ``active_set``).
+Where links may touch obstacles a step linearises the gaps and finds the points that touch (see ``active_set``). From
+the equilibrium found last the first such step takes the factor that this left: it needs no iteration.
 
 Links that spin between ball joints, where loads alone resist, are held and turned step by step (see ``spinning``).
 
