@@ -397,9 +397,10 @@ class TouchingPoints(PosePotential):
         body = linkage.body_of(contact.link)
         self._drawn = np.array([in_dimension(p, linkage.dim) for p in contact.points])
         self._offsets, self._space = self._drawn - linkage.bodies[body].centre, linkage.joints.space
+        assert contact.stiffness is not None, "rigid links have one"
         self.bodies, self._obstacle, self._stiffness = (body,), contact.obstacle, contact.stiffness
         self.weights = np.ones(len(self._drawn))
-        self.compliances = self.weights / contact.stiffness
+        self.compliances = self.weights / self._stiffness
 
     def value(self, poses):
         inside = np.maximum(-self._gaps_at(poses), 0.0)
