@@ -5,7 +5,9 @@ when it took few iterations; the tangent bounds their motion; equilibria reached
 small relative to the distance covered, however far the prescribed value: the softest stiffness falls as √(1 − p / p*)
 towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5 % of it. A step that
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
-back: it is halved too, and if that does not help the snap is accepted and counted.
+back: it is halved too, and if that does not help the snap is accepted and counted. Where other points touch obstacles
+the tangent changes at once: steps then take up the whole distance again, unless they had to be halved, and equilibria
+beyond what looked like a snap, but may be such a kink, are kept until steps come near.
 
 Where an equilibrium is not found at once, fallbacks follow in this order. All of them are bounded by counts, which are
 the same on all processes and machines, and not by time:
@@ -216,20 +218,24 @@ class LoadStepper(Stepper):
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
+        # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
+        aside, halved = dict[float, EquilibriumPoint](), False
         while True:
             remaining = control.prescribed - self._value
             step = self._limited(step, distance)
             arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.prescribed if arrives else self._value + step
             try:
-                point = self._correct(self._guess(control.at(value)), control.at(value))
+                point = aside.pop(value, None) or self._correct(self._guess(control.at(value)), control.at(value))
                 snapped = self._snapped(point)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
-                    step, beyond = 0.5 * (value - self._value), point
+                    step, beyond, halved = 0.5 * (value - self._value), point, True
+                    if self.system.contact is not None:
+                        aside[value] = point
                     continue
             except NotConverged as failure:
                 tried.append(value)
-                failed += 1
+                failed, halved = failed + 1, True
                 step = 0.5 * (value - self._value)
                 if abs(step) > steps.smallest * self._scale(distance) and failed < steps.failures:
                     continue
@@ -248,11 +254,14 @@ class LoadStepper(Stepper):
                     self._value,
                     point.control.prescribed,
                 )
+            changed = bool(self._points) and self._others_touch(self._points[-1].touching, point.touching)
             self._accept_at(point)
             if self._value == control.prescribed:
                 return point
             failed, beyond = 0, None
-            if point.iterations <= steps.iterations:
+            if changed and not halved:
+                step = control.prescribed - self._value
+            elif point.iterations <= steps.iterations:
                 step *= 2.0
 
     @property

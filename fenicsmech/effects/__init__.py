@@ -13,7 +13,7 @@ Each is an ``Effect`` of the ``mechanism`` layer in a file of its own. An effect
 nothing: no form, no unknown, no entry of a matrix.
 """
 
-from fenicsmech.effects.contact import Contact, Cylinder, HalfPlane, Obstacle, OneSided, smooth_gap
+from fenicsmech.effects.contact import Contact, Cylinder, HalfPlane, Obstacle, OneSided, TouchingPoints, smooth_gap
 from fenicsmech.effects.force_region import region_average
 from fenicsmech.effects.gravity import Gravity, Mass
 from fenicsmech.effects.joint_spring import JointCompliance, JointSpring

@@ -228,7 +228,7 @@ class Contact(Effect):
         return fem.Constant(fields.mesh, _RELATIVE_STIFFNESS * link.material.law.E) / height
 
     def pose_potentials(self, linkage):
-        return [_Points(self, linkage)] if isinstance(self.link, RigidLink) else []
+        return [TouchingPoints(self, linkage)] if isinstance(self.link, RigidLink) else []
 
 
 class OneSided:
@@ -384,44 +384,70 @@ class OneSided:
         return found
 
 
-class _Points(PosePotential):
-    """½ k Σ ⟨−g⟩² at points of a rigid link."""
+class TouchingPoints(PosePotential):
+    """½ k Σ ⟨−g⟩² at n points of a rigid link, with the same parts as those of ``OneSided``.
+
+    Attributes:
+        compliances: 1/k, (n,).
+        weights: one each, (n,).
+        gaps: g, of the last ``update``, (n,).
+    """
 
     def __init__(self, contact: Contact, linkage: Linkage) -> None:
         body = linkage.body_of(contact.link)
         self._drawn = np.array([in_dimension(p, linkage.dim) for p in contact.points])
         self._offsets, self._space = self._drawn - linkage.bodies[body].centre, linkage.joints.space
+        assert contact.stiffness is not None, "rigid links have one"
         self.bodies, self._obstacle, self._stiffness = (body,), contact.obstacle, contact.stiffness
+        self.weights = np.ones(len(self._drawn))
+        self.compliances = self.weights / self._stiffness
 
     def value(self, poses):
-        inside = self._touching(poses)[1]
+        inside = np.maximum(-self._gaps_at(poses), 0.0)
         return 0.5 * self._stiffness * float(inside @ inside)
 
     def gradient(self, poses):
-        point, inside, _, motion = self._touching(poses)
-        slope = np.einsum("ni,nia->na", self._gap.gradient(*point)[:, 0], motion)
-        return -self._stiffness * inside @ slope
+        self.update(poses)
+        return self.forces(self._stiffness * np.maximum(-self.gaps, 0.0))
 
     def hessian(self, poses):
-        point, inside, offsets, motion = self._touching(poses)
-        normal = self._gap.gradient(*point)[:, 0]
-        slope = np.einsum("ni,nia->na", normal, motion)
-        hessian = np.einsum("nij,nia,njb->ab", self._gap.hessian(*point, inside[:, None]), motion, motion)
-        turn = self._space.displacement_hessian(poses[self.bodies[0]], (inside[:, None] * normal).T @ offsets)
-        return self._stiffness * (slope.T @ slope - hessian - turn)
+        self.update(poses)
+        return self.stiffness(self._stiffness * (self.gaps < 0.0), self._stiffness * np.maximum(-self.gaps, 0.0))
+
+    def update(self, poses: np.ndarray) -> None:
+        """Takes the ``poses`` of all bodies."""
+        self._pose, numbers = poses[self.bodies[0]], np.array([self._obstacle.numbers])
+        self._places = self._where(poses)
+        self.gaps = self._gap.value(self._places, numbers)[:, 0]
+        self._normals = self._gap.gradient(self._places, numbers)[:, 0]
+        self._motion = self._space.displacement_gradient(self._pose, self._offsets)
+        self._slopes = np.einsum("ni,nia->na", self._normals, self._motion)
+
+    def rates(self, motion: np.ndarray) -> np.ndarray:
+        """∇g · δu at the points, (n,), from δz of the link's pose."""
+        return self._slopes @ motion
+
+    def forces(self, pressures: np.ndarray) -> np.ndarray:
+        """−Σ p ∇g by the link's pose, the gradient of V where p are the ``pressures``."""
+        return -pressures @ self._slopes
+
+    def stiffness(self, stiffness: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+        """Σ D ∇g ⊗ ∇g − p ∇²g by the link's pose, ``stiffness`` is D, ``pressures`` p."""
+        numbers = np.array([self._obstacle.numbers])
+        curvature = self._gap.hessian(self._places, numbers, pressures[:, None])
+        hessian = np.einsum("nij,nia,njb->ab", curvature, self._motion, self._motion)
+        turn = self._space.displacement_hessian(self._pose, (pressures[:, None] * self._normals).T @ self._offsets)
+        return (stiffness[:, None] * self._slopes).T @ self._slopes - hessian - turn
 
     @cached_property
     def _gap(self) -> SmoothFunction:
         return smooth_gap(self._obstacle, self._space.dim)
 
-    def _touching(self, poses: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-        """Of the points inside: arguments of g, −g, offsets from the body's centre, and ∂u/∂z."""
-        pose, numbers = poses[self.bodies[0]], np.array([self._obstacle.numbers])
-        where = self._drawn + self._space.displace(pose, self._offsets)
-        gap = self._gap.value(where, numbers)[:, 0]
-        inside = gap < 0.0
-        offsets = self._offsets[inside]
-        return (where[inside], numbers), -gap[inside], offsets, self._space.displacement_gradient(pose, offsets)
+    def _where(self, poses: np.ndarray) -> np.ndarray:
+        return self._drawn + self._space.displace(poses[self.bodies[0]], self._offsets)
+
+    def _gaps_at(self, poses: np.ndarray) -> np.ndarray:
+        return self._gap.value(self._where(poses), np.array([self._obstacle.numbers]))[:, 0]
 
 
 def smooth_gap(obstacle: Obstacle, dim: int) -> SmoothFunction:

@@ -20,6 +20,8 @@ Steps into a plane across a path (see ``control``) add τ x₁, so that gaps als
 out of the plane change τ by t · a. Least squares are then solved for given τ, and the τ that leads into the plane is
 found by Brent's method.
 
+Points of rigid links are found in the same way, with b the rates of their gaps by the links' poses.
+
 Iterations thus depend on how far from linear links and gaps are, not on how many points touch or come and go. The next
 matrix takes the points and pressures of the linearised gaps, not those of the state, whose gaps are of second order.
 
@@ -39,7 +41,7 @@ from petsc4py import PETSc
 from scipy.optimize import brentq, nnls
 
 from fenicsmech.collective import from_one
-from fenicsmech.effects import OneSided
+from fenicsmech.effects import OneSided, TouchingPoints
 from fenicsmech.equilibrium.control import PathPlane
 from fenicsmech.equilibrium.unknowns import ScaledUnknowns
 from fenicsmech.errors import set_options
@@ -70,18 +72,31 @@ class ActiveSetOptions:
 
 
 class ActiveSet:
-    """Points of some surfaces that are expected to touch, and the steps in which they change.
+    """Points of some surfaces, and of rigid links, that are expected to touch, and the steps in which they change.
 
     Args:
-        surfaces: with the points.
+        surfaces: with points.
+        rigid: points of rigid links, each with the numbers of its link's poses z.
         unknowns: x and G, at the poses of the last residual.
         comm: the processes.
+
+    Attributes:
+        poses: of the loaded state.
     """
 
-    def __init__(self, surfaces: Sequence[OneSided], unknowns: ScaledUnknowns, comm: MPI.Comm) -> None:
+    def __init__(
+        self,
+        surfaces: Sequence[OneSided],
+        rigid: Sequence[tuple[TouchingPoints, np.ndarray]],
+        unknowns: ScaledUnknowns,
+        comm: MPI.Comm,
+    ) -> None:
         self._surfaces, self._unknowns, self._comm, self._options = surfaces, unknowns, comm, ActiveSetOptions()
+        # all know poses: the rank that holds the border counts their points
+        self._rigid, self._own_rigid = rigid, rigid if unknowns.numbering.rows.last else ()
+        self.poses = unknowns.poses
         self._compliances = self._joined(lambda surface: surface.compliances)
-        self._sections = np.cumsum([len(surface.compliances) for surface in surfaces])[:-1]
+        self._sections = np.cumsum([len(parts.compliances) for parts in self._parts])[:-1]
         counts = comm.allgather(len(self._compliances))
         self._first = sum(counts[: comm.rank])  # number of this rank's first point over all ranks
         self._load_factor = 0.0
@@ -94,6 +109,15 @@ class ActiveSet:
     def start(self, load_factor: float) -> None:
         """Expects the points that touch at the state that is next linearised; ``load_factor`` is that of the energy."""
         self._load_factor, self._expected = load_factor, None
+
+    def take_factor(self) -> None:
+        """Takes the factor at hand for that of the loaded state, with the points that touch there."""
+        self._hold(self.touching())
+
+    def _hold(self, active: np.ndarray) -> None:
+        """Takes A for that of a new matrix."""
+        self._active = active
+        self._corrected, self._columns, self._along = np.zeros(0, int), np.zeros((len(active), 0)), np.zeros(0)
 
     def touching(self) -> np.ndarray:
         """Whether each of this rank's points touches, at the loaded state. Local."""
@@ -108,7 +132,8 @@ class ActiveSet:
     def touched(self, *, expected: bool) -> frozenset[Link]:
         """The links with points that touch at the loaded state, or in the matrix as ``expected`` there."""
         points = self._active if expected else self.touching()
-        count = self._comm.allreduce(np.array([np.count_nonzero(own) for _, own in self._each(points)]))
+        own = self._each(points)[: len(self._surfaces)]
+        count = self._comm.allreduce(np.array([np.count_nonzero(some) for _, some in own]))
         return frozenset(surface.link for surface, some in zip(self._surfaces, count, strict=True) if some)
 
     def add_stiffness(self, matrix: PETSc.Mat) -> None:
@@ -116,12 +141,17 @@ class ActiveSet:
         ``matrix`` and leaves it unassembled. Local."""
         touching = self.touching()
         present = np.maximum(-self._gaps, 0.0) / self._compliances
-        self._active, pressures = (touching, present) if self._expected is None else self._expected
-        self._corrected, self._columns, self._along = np.zeros(0, int), np.zeros((len(touching), 0)), np.zeros(0)
+        active, pressures = (touching, present) if self._expected is None else self._expected
+        self._hold(active)
         stiffness = self._load_factor * (self._active * 1.0 - touching) / self._compliances
         pairs = zip(self._each(stiffness), self._each(self._load_factor * (pressures - present)), strict=True)
-        for (surface, own), (_, pressure) in pairs:
-            surface.add_stiffness(matrix, self._unknowns.numbering.rows_of, own, pressure)
+        columns = {id(points): own for points, own in self._own_rigid}
+        for (part, own), (_, pressure) in pairs:
+            if isinstance(part, OneSided):
+                part.add_stiffness(matrix, self._unknowns.numbering.rows_of, own, pressure)
+            else:
+                rows = (self._unknowns.numbering.rows.poses.first + columns[id(part)]).astype(PETSc.IntType)
+                matrix.setValues(rows, rows, part.stiffness(own, pressure), addv=PETSc.InsertMode.ADD)
 
     def corrected(
         self,
@@ -168,25 +198,36 @@ class ActiveSet:
         return solve(right)
 
     def _update(self) -> None:
-        """Takes the displacements that the fields hold. Local."""
+        """Takes the displacements that the fields hold, and the poses. Local."""
         for surface in self._surfaces:
             surface.update()
+        for points, _ in self._own_rigid:
+            points.update(self.poses)
         self._gaps = self._joined(lambda surface: surface.gaps)
 
     def _rates(self, x: PETSc.Vec) -> np.ndarray:
         """b · x at this rank's points."""
-        motion = self._unknowns.apply(x)[self._unknowns.numbering.rows.nodes.local]
-        return self._joined(lambda surface: surface.rates(motion))
+        unknowns = self._unknowns
+        motion = unknowns.apply(x)[unknowns.numbering.rows.nodes.local]
+        rates = [surface.rates(motion) for surface in self._surfaces]
+        if self._rigid:
+            z = unknowns.step(x).z
+            rates += [points.rates(z[own]) for points, own in self._own_rigid]
+        return _joined(rates)
 
     def _force(self, points: np.ndarray, forces: np.ndarray) -> PETSc.Vec:
         """Σ a b of ``points``, numbered over all ranks, with the ``forces`` a."""
         numbering, values = self._unknowns.numbering, np.zeros(len(self._gaps))
         own = (points >= self._first) & (points < self._first + len(values))
         values[points[own] - self._first] = forces[own]
-        links = np.zeros(numbering.rows.links.count)
-        for surface, forces_here in self._each(values):
+        links, border = np.zeros(numbering.rows.links.count), np.zeros(numbering.unknowns.border.size)
+        found = self._each(values)
+        for surface, forces_here in found[: len(self._surfaces)]:
             links[numbering.rows.nodes.local] -= surface.forces(forces_here / surface.weights)
-        return self._unknowns.apply_transpose(links, np.zeros(numbering.unknowns.border.size))
+        z = numbering.unknowns.restrict_border(border).poses
+        for (_, columns), (part, forces_here) in zip(self._own_rigid, found[len(self._surfaces) :], strict=True):
+            z[columns] -= part.forces(forces_here)
+        return self._unknowns.apply_transpose(links, border)
 
     def _missed(self, gaps: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
         """Numbers of the points to correct next: those of the largest a among the others, as many as so far."""
@@ -219,11 +260,20 @@ class ActiveSet:
         # of one process: which points touch is a decision that depends on rounding
         return from_one(self._comm, solution)
 
-    def _joined(self, values: Callable[[OneSided], np.ndarray]) -> np.ndarray:
-        return np.concatenate([values(surface) for surface in self._surfaces])
+    @property
+    def _parts(self) -> list[OneSided | TouchingPoints]:
+        """Surfaces, and this rank's points of rigid links."""
+        return [*self._surfaces, *(points for points, _ in self._own_rigid)]
 
-    def _each(self, values: np.ndarray) -> list[tuple[OneSided, np.ndarray]]:
-        return list(zip(self._surfaces, np.split(values, self._sections), strict=True))
+    def _joined(self, values: Callable[[OneSided | TouchingPoints], np.ndarray]) -> np.ndarray:
+        return _joined([values(part) for part in self._parts])
+
+    def _each(self, values: np.ndarray) -> list[tuple[OneSided | TouchingPoints, np.ndarray]]:
+        return list(zip(self._parts, np.split(values, self._sections), strict=True)) if self._parts else []
+
+
+def _joined(values: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate(values) if values else np.zeros(0)
 
 
 def _missing(gaps: np.ndarray, present: np.ndarray, d: np.ndarray, active: np.ndarray) -> np.ndarray:

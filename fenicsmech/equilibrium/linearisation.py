@@ -324,6 +324,17 @@ class Linearisation:
         """The change of state that x stands for."""
         return self._system.unknowns.step(x)
 
+    def left_by(self, start: State, control: Control) -> bool:
+        """Whether K is still the matrix last factored, and that of ``start`` under ``control`` too.
+
+        It depends on the control by what that prescribes, not by the value. Local.
+        """
+        state = self.state
+        same_state = start.u is state.u and start.poses is state.poses and np.array_equal(start.motors, state.motors)
+        same_loads = start.load_factor == state.load_factor and start.minimum_shift == state.minimum_shift
+        same_matrix = self._version == self._system.kkt.version and control.constrained == self.control.constrained
+        return same_state and same_loads and same_matrix
+
     def _check(self) -> None:
         if self._version != self._system.kkt.version:
             raise RuntimeError("this linearisation is out of date: another matrix was made or factored since")

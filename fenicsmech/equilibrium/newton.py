@@ -29,7 +29,8 @@ Close to convergence the factor of the KKT matrix K is reused (simplified Newton
 as long as corrections contract by a factor of 1000 or more; otherwise, for example near a limit point, K is factored
 again.
 
-Where links may touch obstacles a step linearises the gaps and finds the points that touch (see ``active_set``).
+Where links may touch obstacles a step linearises the gaps and finds the points that touch (see ``active_set``). From
+the equilibrium found last the first such step takes the factor that this left: it needs no iteration.
 
 Links that spin between ball joints, where loads alone resist, are held and turned step by step (see ``spinning``).
 
@@ -65,6 +66,9 @@ from fenicsmech.log import logger
 _log = logger(__name__)
 _LEAST_SHIFT = 1e-9  # first, in units of the mean stiffness; slender links bend with 1e-6 of it and less
 _FLOOR_OF_SHIFTS = 1e-13  # likewise, to which they fall from iteration to iteration
+
+_Began = tuple[State, np.ndarray] | None
+"""Where the last step began, and its motion of the nodes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,6 +140,7 @@ class NewtonSolver(EquilibriumSolver):
 
     options: PrimalDualNewton
     _held = False  # whether spins that loads or obstacles may resist are
+    _left: EquilibriumPoint | None = None  # found last
 
     def __init__(self, system: EquilibriumSystem, options: PrimalDualNewton) -> None:
         super().__init__(system, options)
@@ -157,13 +162,16 @@ class NewtonSolver(EquilibriumSolver):
         best, not_better, line_search = (state, residual), 0, False
         diverged, raising = None, math.inf  # before the first step of any stability that raised the residual; length of
         # the last such step
-        last: tuple[State, np.ndarray] | None = None  # where the last step began, and its motion of the nodes
+        last: _Began = None
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
         singular = 0  # of the last iterations, those with a null pivot
         most = self.factorisations + options.factorisations
         contact = system.contact
         if contact is not None:
             contact.start(start.load_factor)
+            if (found := self._without_factor(start, control, residual)) is not None:
+                state, residual, last = found
+                best = min(best, (state, residual), key=lambda each: each[1].norm)
         for iteration in range(limit + 1):
             residuals.append(self.relative(residual))
             # steps with a shift creep along soft modes: that rounding no longer falls with them says nothing
@@ -174,7 +182,9 @@ class NewtonSolver(EquilibriumSolver):
                 current = current and options.reuse_factor > 0.0
                 if not (current or self._held):  # stability is of the true matrix
                     self.linearise(state, control, residual, iterations=iteration)
-                return self.accept(state, control, residual, residuals, iteration)
+                point = self.accept(state, control, residual, residuals, iteration)
+                self._left = None if self._held else point
+                return point
             if iteration == limit or self.factorisations >= most:
                 break
             near = path or (any_stability and (diverged is not None or residuals[-1] < options.near))
@@ -199,8 +209,7 @@ class NewtonSolver(EquilibriumSolver):
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, _explained(failure, singular))
-            # pressures of mixed elements are stresses that the step solves for already
-            last = (before, -length * motion) if options.predicted_stress and not system.blocks.pressures.size else None
+            last = (before, -length * motion) if self._predicts_stress else None
             close = self.relative(residual) < options.near
             if near and not (close and residual.norm <= norm) and not self.converged(residual, norm):
                 # once from a stable equilibrium too: just beyond a bifurcation small residuals hide large motions
@@ -222,6 +231,38 @@ class NewtonSolver(EquilibriumSolver):
                 state, line_search, last = best[0], True, None
                 residual, norm = self._again(state, control), math.inf
         return self.accept_best(*best, control, residuals, _explained(self.exhausted(residuals, iteration), singular))
+
+    def _without_factor(
+        self, start: State, control: Control, residual: Residual
+    ) -> tuple[State, Residual, _Began] | None:
+        """The first step from the equilibrium found last, with the factor it left; None where that is another one's.
+
+        With gaps linearised it is the prediction under contact.
+        """
+        left, contact = self._left, self.system.contact
+        if self._held or left is None or contact is None or control.along_path:
+            return None
+        if not left.linearisation.left_by(start, control) or self.relative(residual) < self.options.near:
+            return None
+        contact.take_factor()
+        x = self.try_solve(residual.vector, self.step_accuracy(residual))
+        if x is not None and self.descends():
+            x = self._with_contact(contact, x, residual)
+            if x is not None:
+                motion = self.system.unknowns.apply(x)
+                try:
+                    state, after, length = self._full_step(start, control, self.newton_step(x, None), residual, 0)
+                except NotConverged:
+                    pass
+                else:
+                    return state, after, (start, -length * motion) if self._predicts_stress else None
+        self._again(start, control)
+        return None
+
+    @property
+    def _predicts_stress(self) -> bool:
+        """Pressures of mixed elements are stresses that the step solves for already."""
+        return self.options.predicted_stress and not self.system.blocks.pressures.size
 
     def residual(self, state: State, control: Control) -> Residual:
         """The residual that steps bring to zero."""

@@ -22,7 +22,7 @@ from petsc4py import PETSc
 
 from fenicsmech.collective import from_one
 from fenicsmech.compat import destroy_garbage
-from fenicsmech.effects import OneSided
+from fenicsmech.effects import OneSided, TouchingPoints
 from fenicsmech.elasticity import ElasticBody, PredictedStress
 from fenicsmech.equilibrium.active_set import ActiveSet
 from fenicsmech.equilibrium.border import BorderTerms, PointLoad
@@ -88,7 +88,7 @@ class EquilibriumSystem:
         kkt: the KKT matrix last linearised; take it before another ``residual``.
         spinning: links whose spins loads or obstacles may resist.
         surfaces: of ``one_sided``.
-        contact: the points of these; None without them.
+        contact: the points of these, and those of rigid links; None without any.
     """
 
     def __init__(
@@ -130,7 +130,12 @@ class EquilibriumSystem:
             )
             self.unknowns = ScaledUnknowns(elastic, numbering, interfaces, joints, extended.getDiagonal().array_r)
             self.kkt = KktMatrix(elastic, numbering, self.unknowns, extended, clock=clock)
-            self.contact = ActiveSet(one_sided, self.unknowns, comm) if one_sided else None
+            rigid = [
+                (own, joints.columns[own.bodies[0]])
+                for own in potentials
+                if isinstance(own, TouchingPoints) and own.bodies[0] in joints.columns
+            ]
+            self.contact = ActiveSet(one_sided, rigid, self.unknowns, comm) if one_sided or rigid else None
 
     @cached_property
     def _predicted_stress(self) -> PredictedStress:
@@ -187,6 +192,8 @@ class EquilibriumSystem:
     def load(self, state: State) -> None:
         """Makes the finite-element fields hold ``state``."""
         load_fields(self.elastic, self.interfaces, state)
+        if self.contact is not None:
+            self.contact.poses = state.poses
 
     def touching(self, state: State) -> np.ndarray:
         """Loads ``state``, and says whether each of this rank's points touches an obstacle there, (n,). Local."""

@@ -22,6 +22,7 @@ from mpi4py import MPI
 
 from fenicsmech.collective import agreed, from_one
 from fenicsmech.continuation import ArcSteps, DeadCentreStepper, LoadStepper, LoadSteps, LoadStepsFailed, follow_to
+from fenicsmech.effects import Contact
 from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
@@ -425,6 +426,8 @@ class CurveStepper:
         if not (self.request.others or self._model.effects):
             return state
         control = LoadFactorControl()
+        if (found := self._against_obstacles(state, control.at(1.0))) is not None:
+            return found
         if self._springs_below_rounding and (settled := self._settled(control)) is not None:
             return settled
         start, predictor = control.prepare(state), self.discretisation.predictor
@@ -452,6 +455,30 @@ class CurveStepper:
             ) from failure
         self._effort += Effort(stepper.iterations, stepper.snaps)
         return state
+
+    def _against_obstacles(self, state: State, control: LoadFactorControl) -> State | None:
+        """The configuration where obstacles are all that acts: ``state`` if it touches none, or the stable equilibrium
+        less than a load step away; else None.
+
+        An obstacle does not grow as loads do: the least part of its stiffness pushes links out of it.
+        """
+        if self.request.others or not all(isinstance(effect, Contact) for effect in self._model.effects):
+            return None
+        all_loads = control.prepare(state)
+        self._system.load(all_loads)
+        residual = self._system.residual(all_loads, control)
+        if residual.norm == 0.0:
+            return all_loads
+        if self._system.contact is None:
+            return None
+        try:
+            point = self.solver.solve(all_loads, control)
+        except NotConverged as failure:
+            self._effort += Effort(failure.iterations)
+            return None
+        self._effort += Effort(point.iterations)
+        moved = self._system.size(self._system.difference(point.state, state))
+        return point.state if moved <= LoadSteps().motion and not point.state.unstable else None
 
     def _followed(self, start: State, control: LoadFactorControl) -> State | None:
         """The first stable equilibrium under all constant loads on the path from ``start`` through that at ``control``,

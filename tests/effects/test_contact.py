@@ -17,7 +17,7 @@ from fenicsmech.quantities import Sensitivity
 from ..design.in_plane import design_field
 from ..design.refusal import refused
 from ..oracles.wrapped import wrap
-from .touching import block, cantilever, finger, touching_beside_another, wrapped, wrapped_tip, wrapping_force
+from .touching import block, cantilever, channel, finger, touching_beside_another, wrapped, wrapped_tip, wrapping_force
 
 PULLS = [0.05, 0.1, 0.2, 0.4]
 
@@ -91,7 +91,7 @@ def test_a_cantilever_wraps_round_a_cylinder_in_few_iterations(load):
     centreline = 50.0 + 0.5 * 0.005  # radius of it, over the length
     assert frame.displacement == pytest.approx(100.0 * wrap(load, centreline).deflection, rel=1e-3)
     assert frame.displacement == pytest.approx(wrapped_tip(load), rel=1e-3)
-    assert frame.iterations <= 30
+    assert frame.iterations <= 6
     assert frame.stable
     force, gap = case.measure(frame)
     assert force[1] == pytest.approx(wrapping_force(load), rel=0.01)  # all of it where the beam leaves the cylinder
@@ -199,14 +199,22 @@ def test_contact_takes_as_many_iterations_as_bending_however_stiff_the_obstacle_
     for active in (False, True):
         case = finger("plane-stress", stiffness=stiffness, active=active)
         pulled[active] = [f.iterations for f in case.simulation.load_displacement(case.force, forces=PULLS).frames]
-    assert max(pulled[True]) <= max(pulled[False]) + 2
+    assert sum(pulled[True]) <= sum(pulled[False])
 
 
 def test_lying_down_takes_few_iterations():
     # the tip comes down on the plane, then the beam lies down on it: points of contact come and go by dozens
     case = cantilever("plane-stress", gap=1.0)
     frames = case.simulation.load_displacement(case.force, forces=[0.05, 0.12, 0.18, 0.3]).frames
-    assert max(frame.iterations for frame in frames) <= 10
+    assert sum(frame.iterations for frame in frames) <= 12
+
+
+def test_the_first_touch_of_a_strip_that_buckles_is_found_once():
+    # its motion quickens before it touches: that looks like a snap
+    case = channel()
+    frames = case.simulation.load_displacement(case.force, forces=[10.0, 20.0, 40.0]).frames
+    assert sum(frame.iterations for frame in frames) <= 24
+    assert not any(frame.snapped_through for frame in frames)
 
 
 def test_a_wrapped_cantilever_is_differentiated_by_the_design_field():
@@ -306,8 +314,9 @@ def _travel(case, frame) -> float:
     return case.simulation.model.travel(case.force, frame.state)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize(
+    "space", ["plane-stress", *(pytest.param(s, marks=pytest.mark.thorough) for s in ("3d-symmetric", "3d"))]
+)
 def test_a_rigid_link_rests_on_its_points(space):
     # a leaf that carries next to nothing holds a table, drawn with its feet a little below the plane
     mechanism = fm.Mechanism("table")
@@ -323,6 +332,7 @@ def test_a_rigid_link_rests_on_its_points(space):
     (frame,) = simulation.load_displacement(push, forces=[4.0]).frames
     # the feet carry 3 and 1: they stand 0.06 and 0.02 below the plane, and the force is a quarter of their way apart
     assert frame.displacement == pytest.approx(0.05 - 0.25 * 0.04, rel=2e-3)
+    assert frame.iterations <= 10
     assert frame.stable
 
 
