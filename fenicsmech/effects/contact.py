@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import basix
 import numpy as np
@@ -166,6 +167,8 @@ class Contact(Effect):
     Raises:
         DescriptionError: a number is invalid, or a field that a link of this kind needs is missing.
     """
+
+    obstructs: ClassVar[bool] = True
 
     link: Link
     obstacle: Obstacle

@@ -14,6 +14,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 from fenicsmech.errors import DescriptionError, expect, set_fields
 from fenicsmech.mechanism.mechanism import Mechanism
@@ -28,7 +29,12 @@ class Effect(ABC):
 
     It overrides the hooks that it needs. By default each hook returns nothing, and adds no form, no unknown and no
     entry of a matrix. The arguments of hooks are objects of the layers above.
+
+    Attributes:
+        obstructs: whether it only keeps links from places, and does not grow as loads do when these are applied.
     """
+
+    obstructs: ClassVar[bool] = False
 
     @property
     def faces(self) -> tuple:

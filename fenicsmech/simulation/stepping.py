@@ -22,7 +22,6 @@ from mpi4py import MPI
 
 from fenicsmech.collective import agreed, from_one
 from fenicsmech.continuation import ArcSteps, DeadCentreStepper, LoadStepper, LoadSteps, LoadStepsFailed, follow_to
-from fenicsmech.effects import Contact
 from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
@@ -462,7 +461,7 @@ class CurveStepper:
 
         An obstacle does not grow as loads do: the least part of its stiffness pushes links out of it.
         """
-        if self.request.others or not all(isinstance(effect, Contact) for effect in self._model.effects):
+        if self.request.others or not all(effect.obstructs for effect in self._model.effects):
             return None
         all_loads = control.prepare(state)
         self._system.load(all_loads)
