@@ -46,7 +46,8 @@ export class Side {
         const ratio = value / curve.largest, changes = [{ kind: "set", path: ["curves", n, "largest"], value }];
         if (!(ratio > 0)) return;
         this.store.project.targets.forEach((target, k) => {
-          if (target.curve === n && Math.abs(target.force) > Math.abs(value)) changes.push({ kind: "set", path: ["targets", k, "force"], value });
+          const given = curve.held ? "displacement" : "force";
+          if (target.curve === n && Math.abs(target[given]) > Math.abs(value)) changes.push({ kind: "set", path: ["targets", k, given], value });
         });
         this.store.edit(changes);
       }),

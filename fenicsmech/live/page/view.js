@@ -134,9 +134,9 @@ export class View {
   preview() {
     const { store } = this, s = store.previewed, base = store.base(), lean = store.lean(), parts = [], mesh = store.drawnMesh();
     if (s && base && !lean) for (const link of base.links) {
-      if (!link.thickness) continue;
-      const d = path(outline(controlsAfter(link, s), link.thickness), true);
-      parts.push(make("path", { class: "preview", d  }));
+      const after = controlsAfter(link, s);
+      if (!link.thickness || String(after) === String(link.controls)) continue; // a force that moves shapes no link
+      parts.push(make("path", { class: "preview", d: path(outline(after, link.thickness), true) }));
     }
     if (lean && lean.state.nodes.length === mesh.flexible.length) {
       const { nodes, rigid } = leaned(lean), rims = mesh.flexible.flatMap((link, k) => link.loops.map((loop) => path(loop.map((own) => nodes[k][own]), true)));
