@@ -229,7 +229,7 @@ function tell(text, error = false) {
   item.textContent = text;
   if (error) item.className = "error";
   if ([...$("told").children].some((own) => own.textContent === text)) return;
-  $("told").append(item);
+  $("told").prepend(item); // the newest is in view
 }
 
 function tabs() {
