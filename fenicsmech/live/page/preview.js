@@ -9,6 +9,7 @@ import { dot, solve } from "./algebra.js";
 import { placed, sampled } from "./targets.js";
 
 const DAMPING = 1e-4;
+const REACH = 2; // typical changes of parameters, up to which a step is drawn: steps for targets that contradict are damped more
 
 // The step of no gesture.
 export const nothing = (linear) => new Array(linear.lengths.length + linear.moves.length).fill(0);
@@ -48,8 +49,16 @@ function bounds(linear, project) {
 
 // The step for the targets of a project.
 export function step(linear, project) {
+  for (let damping = DAMPING; damping < 1e3; damping *= 10) {
+    const s = damped(linear, project, damping);
+    if (!s || linear.lengths.every((length, k) => Math.abs(s[k]) <= REACH * length)) return s;
+  }
+  return null;
+}
+
+function damped(linear, project, damping) {
   const n = linear.lengths.length, wants = project.targets.map((own) => [project.curves[own.curve], ...sampled(project.curves[own.curve], own)]);
-  const A = linear.curvature.map((line, i) => line.map((value, j) => value + (i === j ? DAMPING / linear.lengths[i] ** 2 : 0)));
+  const A = linear.curvature.map((line, i) => line.map((value, j) => value + (i === j ? damping / linear.lengths[i] ** 2 : 0)));
   const b = linear.gradient.map((value) => -value);
   project.targets.forEach((target, k) => {
     const [{ held }, given, wanted] = wants[k], { value, slopes } = row(linear.curves[target.curve], given, n);
