@@ -81,7 +81,12 @@ export class Chart {
   curves() {
     const { store } = this, own = store.curve(), parts = [];
     const before = store.before();
-    if (before) parts.push(make("path", { class: "before", d: path(before.points.map((p) => this.px(p))) }, make("title", {}, "As it was opened")));
+    if (before) {
+      const old = before.points.map((p) => this.px(p)), [x, y] = old.at(-1), end = own && own.points.length ? own.points.at(-1) : null;
+      parts.push(make("path", { class: "before", d: path(old) }, make("title", {}, "As it was opened")));
+      const apart = end && Math.hypot(...this.px([end.displacement, end.force]).map((part, a) => part - old.at(-1)[a]));
+      if (apart > 20) parts.push(make("text", { class: "before-name", x: Math.min(x + 6, this.width - 44), y: y + 16 }, "at first"));
+    }
     const solid = this.solid().map((point) => this.px([point.displacement, point.force]));
     if (solid.length) {
       const stale = store.stale() ? " stale" : "", [x, y] = solid.at(-1);

@@ -15,7 +15,7 @@ const $ = (id) => document.getElementById(id);
 
 const store = {
   project: null, mesh: null, curves: {}, errors: {}, peaks: {}, responses: {}, linear: null, misfits: null, first: [],
-  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null,
+  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null, untargeted: "",
 
   curve() { return this.curves[this.shown]; },
   // The mesh of what is drawn: another curve may still be that of an earlier shape.
@@ -73,7 +73,7 @@ const store = {
     return key(this.solid.project) !== key(this.project);
   },
   send(message) { return send(message); },
-  tell(text, error) { tell(text, error); },
+  tell(text, ...more) { tell(text, ...more); },
   fresh,
   show() { show(); },
   showState() { showState(); },
@@ -222,13 +222,14 @@ function apply(project, changes) {
   }
 }
 
-// A message to the user; null clears them.
-function tell(text, error = false) {
+// A message to the user; null clears them, and the next one clears a passing one.
+function tell(text, error = false, passing = false) {
   if (text === null) { $("told").replaceChildren(); return; }
   const item = document.createElement("li");
   item.textContent = text;
   if (error) item.className = "error";
-  if ([...$("told").children].some((own) => own.textContent === text)) return;
+  [...$("told").children].filter((own) => own.textContent === text || own.dataset.passing).forEach((own) => own.remove());
+  if (passing) item.dataset.passing = true;
   $("told").prepend(item); // the newest is in view
 }
 
@@ -236,6 +237,7 @@ function tabs() {
   const { curves, targets } = store.project, none = untargeted(curves[store.shown]);
   for (const [id, title] of Object.entries(TITLES)) { $(id).disabled = Boolean(none); $(id).title = none || title; }
   $("add").disabled ||= targets.length >= store.most.targets;
+  if (none !== store.untargeted) { store.untargeted = none; if (store.mode === "move") showHint(); }
   $("tabs").replaceChildren(...(curves.length < 2 ? [] : curves.map((curve, k) => {
     const tab = document.createElement("button");
     tab.textContent = curve.name;
@@ -382,9 +384,14 @@ for (const mode of ["move", "shape", "solid"]) $(`mode-${mode}`).onclick = () =>
   for (const own of ["move", "shape", "solid"]) $(`mode-${own}`).setAttribute("aria-pressed", own === mode);
   $("view").dataset.mode = document.body.dataset.mode = mode;
   $("scale-high").textContent = `${figure(store.stressTop)} MPa`;
-  $("hint").textContent = HINTS[mode];
+  showHint();
   show();
 };
+
+function showHint() {
+  const none = store.mode === "move" && store.untargeted;
+  $("hint").textContent = none ? `${none}. Push the mechanism anywhere, or change its shape.` : HINTS[store.mode];
+}
 
 function showPlaying() {
   $("play").setAttribute("aria-pressed", playing);

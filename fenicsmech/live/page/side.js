@@ -118,8 +118,8 @@ export class Side {
   // Fetches a file when the shape has settled, and saves it.
   async save(what, label) {
     const { store } = this;
-    if (store.busy) { store.tell(`${label} comes when the shape has settled…`); await new Promise((go) => store.waiting.push(go)); }
-    if (!["project", "script"].includes(what)) store.tell(`${label} is being made…`);
+    if (store.busy) { store.tell(`${label} comes when the shape has settled…`, false, true); await new Promise((go) => store.waiting.push(go)); }
+    if (!["project", "script"].includes(what)) store.tell(`${label} is being made…`, false, true);
     const found = await fetch(`export/${what}`).catch(() => null);
     if (!found) store.tell("Not connected. Is the program still running?", true);
     if (!found || !found.ok) return; // the server tells why

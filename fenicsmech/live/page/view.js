@@ -15,7 +15,9 @@ export class View {
       return [name, layer];
     }));
     this.note = make("text", { class: "preview-name", x: 6, y: 14 }, "– – linear preview");
-    svg.append(this.world, this.note);
+    this.note.style.display = "none";
+    this.waiting = make("text", { x: "50%", y: "50%", "text-anchor": "middle" }, "The mechanism appears with its first curve…");
+    svg.append(this.world, this.note, this.waiting);
     new ResizeObserver(() => { this.fit(); this.draw(); }).observe(svg);
   }
 
@@ -76,6 +78,7 @@ export class View {
     const state = this.state();
     if (!state || state.nodes.length !== mesh.flexible.length || state.rigid.length !== mesh.rigid.length) return;
     this.now = state;
+    this.waiting.remove();
     const px = 1 / this.scale;
     const rigid = [];
     state.rigid.forEach((points, k) => {
