@@ -647,7 +647,7 @@ def motor_page(page):
 def test_the_slider_of_a_motor_is_the_same_while_it_is_dragged(motor_page):
     page, seen = motor_page, []
     slider = page.chrome.find_element(By.CSS_SELECTOR, "#side input[type=range]")
-    # what is told at the foot of the page takes room from the panel, which scrolls
+    # the panel is longer than the window and scrolls
     page.chrome.execute_script("arguments[0].scrollIntoView({block: 'center'})", slider)
 
     def during():
