@@ -22,7 +22,7 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import JOINT_KINDS
 from fenicsmech.laws import NeoHookean
 from fenicsmech.live.carried import made
-from fenicsmech.live.project import PAPER_NAMES, Project, forces_of, materials
+from fenicsmech.live.project import PAPER_NAMES, Project, forces_of, materials, sampled
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -100,25 +100,34 @@ class Drawing:
             others={self.forces[name]: value for name, value in curve["others"].items()},
         )
 
-    def target(self, project: Project, number: int, value: float, wanted: float, weight: float = 1.0) -> Target:
+    def target(
+        self,
+        project: Project,
+        number: int,
+        value: float,
+        wanted: float,
+        *,
+        weight: float = 1.0,
+        scale: float | None = None,
+    ) -> Target:
         """A target on a curve: the displacement under a force, or the force where displacements are held."""
         curve = project["curves"][number]
         part = self.forces[curve["force"]]
         loads: dict[Any, Any] = {self.forces[k]: own for k, own in curve["others"].items()}
         if curve.get("held"):
             sample = Sample({part: at(value)} | loads, self.configuration(curve))
-            return Target(ForceMagnitude(part), sample, equals=wanted, weight=weight)
+            return Target(ForceMagnitude(part), sample, equals=wanted, weight=weight, scale=scale)
         ratios = curve.get("ratios", {curve["force"]: 1.0})
         sample = Sample({self.forces[k]: own * value for k, own in ratios.items()} | loads, self.configuration(curve))
-        return Target(Displacement(part), sample, equals=wanted, weight=weight)
+        return Target(Displacement(part), sample, equals=wanted, weight=weight, scale=scale)
 
     def problem(self, project: Project) -> DesignProblem | None:
         """The design problem of a project's targets and requirements; None without any or without designs."""
         designs = self.designs(project)
-        targets = [
-            self.target(project, own["curve"], own["force"], own["displacement"], own["weight"])
-            for own in project["targets"]
-        ]
+        targets = []
+        for own in project["targets"]:
+            number, options = own["curve"], {"weight": own["weight"], "scale": own.get("scale")}
+            targets.append(self.target(project, number, *sampled(project["curves"][number], own), **options))
         targets += [made(own["data"], self.parts) for own in project.get("requirements", ())]
         return self._problem(project, designs, targets) if designs and targets else None
 

@@ -45,7 +45,7 @@ from fenicsmech.mechanism import (
 )
 from fenicsmech.meshing import LEAST_SEGMENTS
 from fenicsmech.model import fits
-from fenicsmech.quantities import Sample
+from fenicsmech.quantities import ForceMagnitude, Sample
 from fenicsmech.simulation import Simulation
 
 _REMEDY = "Describe it with what the live page knows: python3 -m fenicsmech.live shows a project"
@@ -91,10 +91,10 @@ def _data(problem: DesignProblem) -> Project:
     targets, requirements = list[dict[str, Any]](), list[dict[str, Any]]()
     for target in problem.targets:
         curve = None if target.sample is None else curves.through(target.sample)
-        found = target.on_curve
-        if found is not None and found[1] and found[2] and target.scale is None and curve is not None:
-            own = {"curve": curve, "force": found[1], "displacement": found[2], "weight": target.weight}
-            targets.append(own)
+        point = _point(target)
+        if curve is not None and point is not None:
+            scale = {} if target.scale is None else {"scale": target.scale}
+            targets.append({"curve": curve, **point, "weight": target.weight, **scale})
         else:
             requirements.append({"name": _words(target), "data": plain(target)})
     if not curves.found:
@@ -122,6 +122,18 @@ def _data(problem: DesignProblem) -> Project:
         "fit": True,
         **{key: value for key, value in more.items() if value},
     }
+
+
+def _point(target: Target) -> dict[str, float] | None:
+    """Force and displacement of a target that is a point of a load–displacement curve; None of others."""
+    sample = target.sample
+    if sample is not None and sample.moved and target.relation == "equals":
+        force, displacement = sample.moved
+        if target.quantity == ForceMagnitude(force) and displacement:
+            return {"force": target.wanted[0], "displacement": displacement}
+    if (found := target.on_curve) is not None and found[1]:
+        return {"force": found[1], "displacement": found[2]}
+    return None
 
 
 class _Curves:

@@ -55,12 +55,14 @@ Solver to server, a line each, with the number of their task:
     fitted    design, misfits, iterations, missed: {problem, remedy} of targets out of reach or an early end, null if
               all is well
     linear    the linear preview at a design, Q(p + s) ≈ Q + e + J s, R ≈ ∂R/∂p s + ½ sᵀ ∂²R/∂p² s:
-                  design, lengths (typical change of each parameter), curves: [{forces, values, errors, jacobian}],
+                  design, lengths (typical change of each parameter), curves: [{at (forces, or displacements that are
+                  held), values (displacements, or forces), errors, jacobian}], empty for forces that grow together,
                   gradient, curvature, active (bounds that hold it back), whole (not cut where a curve snaps),
                   links: [{name, controls [[[x, y, δ], tangent]], entries (parameter of each, −1 none), thickness,
                   follows (rates of controls with each of "moves")}],
                   moves: what follows the parameters in s and the columns of each jacobian: {kind: joint, joints
-                  (numbers of those at one place), axis (0: x, 1: y)} or {kind: motor, name};
+                  (numbers of those at one place), axis (0: x, 1: y)}, {kind: motor, name}, {kind: direction, name} of a
+                  curve's force, in rad, or {kind: force, name, axis} of its point;
                   positions: of motors, of each curve
     required  values of the project's requirements, with their estimated errors: [[component]]; empty if failed
     pushed    curve, at, by, point, rates: of the point with the curve's force, or with those of what the pointer holds

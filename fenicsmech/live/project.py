@@ -191,8 +191,10 @@ PROJECT = Record(
             MOST_CURVES,
         ),
         "targets": Many(
+            # displacements that are wanted under forces, or forces where the curve holds displacements
             Record(
-                {"curve": _CURVE, "force": Number(-1e6, 1e6), "displacement": _COORDINATE, "weight": Number(1e-3, 1e3)}
+                {"curve": _CURVE, "force": Number(-1e6, 1e6), "displacement": _COORDINATE, "weight": Number(1e-3, 1e3)},
+                {"scale": Number(1e-9, 1e6)},  # to which errors are relative
             ),
             0,
             MOST_TARGETS,
@@ -288,12 +290,13 @@ def read_project(data: Any) -> Project:
         if target["curve"] >= len(project["curves"]):
             raise Refused(f"targets[{k}].curve", f"there is no curve {target['curve']}")
         curve = project["curves"][target["curve"]]
-        if "ratios" in curve or curve.get("held"):
+        if "ratios" in curve:
             raise Refused(f"targets[{k}].curve", f"targets on {curve['name']!r} are given in the script")
-        if not target["force"] * curve["largest"] > 0.0:
-            raise Refused(f"targets[{k}].force", "it has not the sign of its curve's force")
-        if not target["displacement"]:
-            raise Refused(f"targets[{k}].displacement", "it is zero, to which no error is relative")
+        given, wanted = ("displacement", "force") if curve.get("held") else ("force", "displacement")
+        if not target[given] * curve["largest"] > 0.0:
+            raise Refused(f"targets[{k}].{given}", f"it has not the sign of its curve's {given}")
+        if not target[wanted] and "scale" not in target:
+            raise Refused(f"targets[{k}].{wanted}", "it is zero, to which no error is relative")
     return project
 
 
@@ -394,6 +397,13 @@ def wants(project: Project) -> bool:
     return bool(project["targets"] or project.get("requirements"))
 
 
+def sampled(curve: Mapping[str, Any], target: Mapping[str, Any]) -> tuple[float, float]:
+    """The force that a target prescribes and the displacement that it wants, or these the other way round where its
+    curve holds displacements."""
+    force, displacement = target["force"], target["displacement"]
+    return (displacement, force) if curve.get("held") else (force, displacement)
+
+
 def forces_of(project: Project, curve: int, *, coarse: bool = False) -> list[float]:
     """The forces of a curve's frames, from zero, those of its targets among them; a third of them if ``coarse``.
 
@@ -402,7 +412,7 @@ def forces_of(project: Project, curve: int, *, coarse: bool = False) -> list[flo
     own = project["curves"][curve]
     steps = -(-own["steps"] // 3) if coarse else own["steps"]
     even = [own["largest"] * k / steps for k in range(steps + 1)]
-    wanted = [target["force"] for target in project["targets"] if target["curve"] == curve]
+    wanted = [sampled(own, target)[0] for target in project["targets"] if target["curve"] == curve]
     spacing = abs(own["largest"]) / steps
     kept = [force for force in even if all(abs(force - other) > 0.2 * spacing for other in wanted)]
     return sorted({0.0, *kept, *wanted}, key=abs)

@@ -7,7 +7,7 @@ from typing import Any
 
 from fenicsmech.live.build import FILES, place_of
 from fenicsmech.live.carried import source
-from fenicsmech.live.project import PAPER_NAMES, Project, forces_of, wants
+from fenicsmech.live.project import PAPER_NAMES, Project, forces_of, sampled, wants
 
 
 def script(project: Project) -> str:
@@ -155,7 +155,8 @@ def _problem(project: Project, parts: _Parts) -> list[str]:
         return []
     targets, note = project["targets"], []
     if not wants(project):  # a problem has at least one
-        targets = [{"curve": 0, "force": forces_of(project, 0)[-1], "displacement": 1.0, "weight": 1.0}]
+        given, wanted = ("displacement", "force") if project["curves"][0].get("held") else ("force", "displacement")
+        targets = [{"curve": 0, given: forces_of(project, 0)[-1], wanted: 1.0, "weight": 1.0}]
         note = ["# the page has no targets: this one keeps the place of those to come"]
     lines = [f"designs = [{', '.join(designs)}]", *note, "targets = ["]
     for own in targets:
@@ -179,14 +180,16 @@ def _problem(project: Project, parts: _Parts) -> list[str]:
 
 
 def _target(own: Mapping[str, Any], curve: Mapping[str, Any], parts: _Parts) -> list[str]:
-    loads = {curve["force"]: own["force"], **curve["others"]}
+    held, (given, wanted) = curve.get("held"), sampled(curve, own)
+    loads = {curve["force"]: f"fm.at({given})" if held else given, **curve["others"]}
     sample = ", ".join(f"{parts.forces[force]}: {value}" for force, value in loads.items())
     return [
         "    fm.Target(",
-        f"        fm.Displacement({parts.forces[curve['force']]}),",
+        f"        fm.{'ForceMagnitude' if held else 'Displacement'}({parts.forces[curve['force']]}),",
         f"        fm.Sample({{{sample}}}, configuration_{own['curve']}),",
-        f"        equals={own['displacement']},",
+        f"        equals={wanted},",
         f"        weight={own['weight']},",
+        *([f"        scale={own['scale']},"] if "scale" in own else []),
         "    ),",
     ]
 

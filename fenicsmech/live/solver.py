@@ -26,7 +26,17 @@ from fenicsmech.live.build import Drawing, draw, placement
 from fenicsmech.live.cancel import Cancellable, Cancelled, TooLong
 from fenicsmech.live.grip import Grip
 from fenicsmech.live.project import Project, drawing, forces_of
-from fenicsmech.live.responses import Outlines, by_force, by_motor, displacement, responses
+from fenicsmech.live.responses import (
+    LoadChange,
+    Outlines,
+    by_force,
+    by_motor,
+    curve_slopes,
+    displacement,
+    responses,
+    shifted,
+    turned,
+)
 from fenicsmech.live.told import missed, remarks, told, too_long
 from fenicsmech.mechanism import Force
 from fenicsmech.plot import MechanismShape
@@ -39,6 +49,8 @@ Emit = Callable[[dict[str, Any]], None]
 
 # the last per cents of the objective belong to the closeness to the drawing, which nobody sees
 OPTIMISER = LevenbergMarquardt(tolerance=0.05)
+
+_SHIFT = 1e-3  # of the size of elements: how far points of forces are moved for derivatives, within what is on a link
 
 
 class Solver:
@@ -143,6 +155,7 @@ class Work:
         solver.check()
         self._meshed, self._shown = False, np.zeros(0)
         self._steady: dict[int, list[float]] = {}  # values of each curve, up to where it snaps or is unstable
+        self._solved: dict[int, tuple[Curve | None, list[Frame]]] = {}  # each curve, with the frames of these values
 
     def solve(self) -> None:
         """The curves of the project's design; before that its optimisation where wanted; derivatives at the end."""
@@ -250,8 +263,10 @@ class Work:
                 held = self._project["curves"][number].get("held", False)
                 stable = [own.stable_under_control if held else own.stable for own in frames]
                 good = [own and not frame.snapped_through for own, frame in zip(stable, frames, strict=True)]
-                pairs = zip(forces, good, strict=False)  # fewer frames where it failed
-                self._steady[number] = [value for value, _ in takewhile(lambda pair: pair[1], pairs) if value]
+                pairs = zip(forces, frames, good, strict=False)  # fewer frames where it failed
+                steady = [(value, frame) for value, frame, _ in takewhile(lambda pair: pair[2], pairs) if value]
+                self._steady[number] = [value for value, _ in steady]
+                self._solved[number] = curve, [frame for _, frame in steady]
             if curve is not None and iterate is None:
                 self._respond(number, curve)
                 peak = curve.frames[-1].peak
@@ -297,22 +312,23 @@ class Work:
         except EquilibriumError:
             return  # the curve that ends early is told already
         self._solver.check()
+        loads, by_loads = self._with_loads()
         rows, curves = 0, []
-        for forces, curve in zip(reached, self._project["curves"], strict=True):
-            mine = slice(rows, rows + len(forces))
-            rows += len(forces)
-            if curve.get("held") or "ratios" in curve:  # no displacements of one force under it
-                forces, mine = [], slice(0)
-            slopes = np.hstack([found.jacobian, found.by_numbers])[mine]
+        for values, curve, slopes in zip(reached, self._project["curves"], by_loads, strict=True):
+            mine = slice(rows, rows + len(values))
+            rows += len(values)
+            if "ratios" in curve:  # no displacements of one force under it
+                values, mine, slopes = [], slice(0), slopes[:0]
+            slopes = np.hstack([found.jacobian[mine], found.by_numbers[mine], slopes])
             own = {"values": found.values[mine], "errors": found.errors[mine], "jacobian": slopes}
-            curves.append({"forces": forces, **{key: _rounded(value) for key, value in own.items()}})
+            curves.append({"at": values, **{key: _rounded(value) for key, value in own.items()}})
         drawn = {own["name"]: own["shape"] for own in self._project["links"] if own["kind"] == "flexible"}
         self._emit(
             {
                 "event": "linear",
                 "design": _design(along, found.placement),
                 "lengths": _rounded(found.lengths),
-                "moves": [own for own, _ in movable],
+                "moves": [own for own, _ in movable] + loads,
                 "positions": [own["positions"] for own in self._project["curves"]],
                 "curves": curves,
                 "gradient": _rounded(found.regulariser.gradient),
@@ -324,7 +340,7 @@ class Work:
                         "name": link.name,
                         "controls": _rounded(link.controls),
                         "entries": entries.tolist(),
-                        "follows": _rounded(follows),
+                        "follows": _rounded(np.pad(follows, [(0, 0)] * 3 + [(0, len(loads))])),
                         "thickness": drawn[link.name].get("thickness"),
                     }
                     for link, entries, follows in zip(
@@ -333,6 +349,38 @@ class Work:
                 ],
             }
         )
+
+    def _with_loads(self) -> tuple[list[dict[str, Any]], list[np.ndarray]]:
+        """Directions and points of the forces of curves, as the page names them, and the derivatives of each curve by
+        these, (values, loads); none where a curve ends early or is at a bifurcation.
+
+        A force over a region acts at no single point.
+        """
+        names: list[dict[str, Any]] = []
+        changes: list[LoadChange] = []
+        for name in dict.fromkeys(curve["force"] for curve in self._project["curves"]):
+            force = self._drawing.forces[name]
+            names.append({"kind": "direction", "name": name})
+            changes.append(turned(force))
+            for axis in range(2 if force.region is None else 0):
+                names.append({"kind": "force", "name": name, "axis": axis})
+                changes.append(shifted(force, axis, _SHIFT * self._project["simulation"]["size"]))
+        found = []
+        for number, curve in enumerate(self._project["curves"]):
+            solved, frames = self._solved[number]
+            if "ratios" in curve:
+                found.append(np.zeros((len(frames), len(names))))
+                continue
+            if solved is None:
+                return [], [np.zeros((len(own), 0)) for _, own in self._solved.values()]
+            simulation, held = self._drawing.simulation, curve.get("held", False)
+            solver = simulation.solver(solved.part, [force for force, _ in solved.others])
+            slopes = curve_slopes(simulation.model, solver, solved, frames, changes, held=held)
+            self._solver.check()
+            if slopes is None:
+                return [], [np.zeros((len(own), 0)) for _, own in self._solved.values()]
+            found.append(slopes)
+        return names, found
 
     def _require(self, at: HandlePlacement | None) -> None:
         """Values of what is required beside the targets on curves."""

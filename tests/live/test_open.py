@@ -203,6 +203,42 @@ def test_a_project_that_is_changed_anyhow_is_refused_or_has_a_script():
     assert 10 < read < 200
 
 
+def test_targets_where_displacements_are_held_are_points_of_the_curve_that_the_page_moves():
+    problem = demo("switch")
+    project, drawing = reopened(problem)
+    assert "requirements" not in project and project["curves"][0]["held"]
+    assert [(own["displacement"], own["force"]) for own in project["targets"]] == [(3.4, 1.0), (15.0, 0.0)]
+    project["targets"][0] |= {"displacement": 4.0, "force": 0.8}
+    moved, other = drawing.problem(read_project(project)).targets
+    force = moved.sample.part
+    assert moved == fm.Target(fm.ForceMagnitude(force), fm.Sample({force: fm.at(4.0)}), equals=0.8, weight=10.0)
+    assert other == problem.targets[1] and 4.0 in forces_of(project, 0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param({"displacement": -3.0}, id="against the curve"),
+        pytest.param({"displacement": 0.0}, id="at its begin"),
+        pytest.param({"scale": 0.0}, id="no scale"),
+        pytest.param({"scale": "1"}, id="a scale in words"),
+        pytest.param({"kind": "held"}, id="an entry that is none"),
+    ],
+)
+def test_a_target_where_displacements_are_held_is_refused_where_it_means_nothing(change):
+    project = project_of(demo("switch"))
+    project["targets"][0] |= change
+    with pytest.raises(Refused):
+        read_project(project)
+
+
+def test_zero_is_wanted_of_a_force_with_a_scale_alone():
+    project = project_of(demo("switch"))
+    del project["targets"][1]["scale"]
+    with pytest.raises(Refused, match="zero, to which no error is relative"):
+        read_project(project)
+
+
 def ball():
     """A problem with joints that only space has."""
     made = fm.Mechanism("ball")
@@ -316,9 +352,13 @@ def test_an_optimised_design_is_opened_and_its_script_computes_its_curve(tmp_pat
     (curve,) = (event for event in events if event["event"] == "curve")
     scale = np.abs(expected.forces).max()
     assert [point["force"] for point in curve["points"]] == pytest.approx(expected.forces, abs=1e-5 * scale)
-    (required,) = (event for event in events if event["event"] == "required")
-    reached = [target.corrected for target in result.targets]
-    assert [value for (value,) in required["values"]] == pytest.approx(reached, abs=1e-4)
+    (estimated,) = (event for event in events if event["event"] == "errors")
+    corrected = {
+        point["displacement"]: point["force"] + error
+        for point, error in zip(curve["points"], estimated["errors"], strict=True)
+    }
+    found = [corrected[target["displacement"]] for target in project["targets"]]
+    assert found == pytest.approx([target.corrected for target in result.targets], abs=1e-4)
     (tmp_path / "design.py").write_text(script(project))
     monkeypatch.chdir(tmp_path)
     found = runpy.run_path("design.py")["curve_0"]

@@ -244,7 +244,7 @@ def test_a_snap_is_told_with_its_force_and_the_preview_ends_before_it():
     assert after["displacement"] > 5.0 * before["displacement"]
     assert "snaps after force" in curve["remarks"][0] and curve["failed"] is None
     assert "Make the largest force smaller" in curve["remarks"][0]
-    assert not linear["whole"] and linear["curves"][0]["forces"][-1] == before["force"]
+    assert not linear["whole"] and linear["curves"][0]["at"][-1] == before["force"]
     # the curve is that of the drawn strip, the preview that of its spline
     assert linear["curves"][0]["values"][-1] == pytest.approx(before["displacement"], rel=0.02)
 
@@ -355,6 +355,77 @@ def test_the_preview_of_a_push_at_any_point_misses_its_solve_by_the_square_of_th
         missed.append(np.abs(before + moved - wanted).max())
         assert missed[-1] < 0.2 * np.abs(wanted - before).max()
     assert missed[0] / missed[1] == pytest.approx(4.0, rel=0.2)
+
+
+def by_force(linear, name, axis=None):
+    """The derivative of the displacement at the end of the curve by a force's angle, or by its point along an axis."""
+    move = {"kind": "direction", "name": name} if axis is None else {"kind": "force", "name": name, "axis": axis}
+    return linear["curves"][0]["jacobian"][-1][len(linear["lengths"]) + linear["moves"].index(move)]
+
+
+def with_force(project, **changes):
+    """The project with its force elsewhere."""
+    return edited(project, [{"kind": "set", "path": ["forces", 0], "value": project["forces"][0] | changes}])
+
+
+def test_the_preview_of_a_direction_that_is_dragged_misses_its_solve_by_the_square_of_the_drag(finished):
+    project, events = finished
+    rate, before, missed = (
+        by_force(only(events, "linear")[0], "push on tip"),
+        only(events, "curve")[0]["points"][-1],
+        [],
+    )
+    for angle in (0.06, 0.03):
+        moved = with_force(project, direction=[np.cos(angle), np.sin(angle)])
+        change = push(moved, before["force"])["point"]["displacement"] - before["displacement"]
+        missed.append(abs(angle * rate - change))
+        assert missed[-1] < 0.3 * abs(change)
+    assert missed[0] / missed[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_the_preview_of_a_point_on_a_rigid_link_that_is_dragged_misses_its_solve_by_the_square_of_the_drag(finished):
+    project, missed = with_force(finished[0], on="left leg", at=[0, 50]), []
+    events = solved(project)
+    rate, before = by_force(only(events, "linear")[0], "push on tip", 1), only(events, "curve")[0]["points"][-1]
+    for shift in (6.0, 3.0):
+        moved = with_force(project, at=[0, 50 + shift])
+        change = push(moved, before["force"])["point"]["displacement"] - before["displacement"]
+        missed.append(abs(shift * rate - change))
+        assert missed[-1] < 0.2 * abs(change)
+    assert missed[0] / missed[1] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.thorough
+def test_the_preview_of_a_point_on_a_flexible_link_is_the_slope_of_the_solves_beside_it(finished):
+    project = with_force(finished[0], on="diagonal", at=[18, 34], direction=[0.88, -0.47])
+    along, step, moved = np.array([0.47, 0.88]), 0.05, []
+    (linear,) = only(solved(project), "linear")
+    for sign in (-1.0, 1.0):
+        at = np.array([18, 34]) + sign * step * along
+        moved.append(push(with_force(project, at=at.tolist()), 0.4)["point"]["displacement"])
+    rate = [by_force(linear, "push on tip", axis) for axis in (0, 1)] @ along
+    assert rate == pytest.approx((moved[1] - moved[0]) / (2.0 * step), rel=0.02)
+
+
+@pytest.mark.thorough
+def test_the_preview_where_displacements_are_held_is_the_slope_of_the_forces(finished):
+    project = finished[0] | {"targets": []}
+    project = edited(project, [{"kind": "set", "path": ["curves", 0], "value": finished[0]["curves"][0] | HELD}])
+    angle, forces = 0.02, []
+    (linear,) = only(solved(project), "linear")
+    for sign in (-1.0, 1.0):
+        moved = with_force(project, direction=[np.cos(angle), sign * np.sin(angle)])
+        forces.append(only(solved(moved), "curve")[0]["points"][-1]["force"])
+    assert by_force(linear, "push on tip") == pytest.approx((forces[1] - forces[0]) / (2.0 * angle), rel=0.02)
+    assert linear["curves"][0]["at"][-1] == HELD["largest"]
+
+
+@pytest.mark.thorough
+def test_a_force_over_a_region_has_a_direction_to_drag_and_no_point(finished):
+    region = {"is": "Disc", "radius": 1.0}
+    project = with_force(finished[0], on="diagonal", at=[18, 34], region=region)
+    kinds = {move["kind"] for move in only(solved(project), "linear")[0]["moves"]}
+    assert kinds == {"joint", "direction"}
 
 
 def every(found):

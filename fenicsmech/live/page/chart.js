@@ -2,6 +2,7 @@
 
 import { curveAfter } from "./preview.js";
 import { drag, figure, make, path, set, ticks } from "./svg.js";
+import { placed, sampled, words } from "./targets.js";
 
 const REST = 250; // ms after which a resting gesture is solved
 
@@ -80,7 +81,12 @@ export class Chart {
   curves() {
     const { store } = this, own = store.curve(), parts = [];
     const before = store.before();
-    if (before) parts.push(make("path", { class: "before", d: path(before.points.map((p) => this.px(p))) }, make("title", {}, "As it was opened")));
+    if (before) {
+      const old = before.points.map((p) => this.px(p)), [x, y] = old.at(-1), end = own && own.points.length ? own.points.at(-1) : null;
+      parts.push(make("path", { class: "before", d: path(old) }, make("title", {}, "As it was opened")));
+      const apart = end && Math.hypot(...this.px([end.displacement, end.force]).map((part, a) => part - old.at(-1)[a]));
+      if (apart > 20) parts.push(make("text", { class: "before-name", x: Math.min(x + 6, this.width - 44), y: y + 16 }, "at first"));
+    }
     const solid = this.solid().map((point) => this.px([point.displacement, point.force]));
     if (solid.length) {
       const stale = store.stale() ? " stale" : "", [x, y] = solid.at(-1);
@@ -130,8 +136,8 @@ export class Chart {
       if (target.curve !== store.shown) return;
       const group = kept.get(String(index)) || this.handle(index);
       const [a, b] = this.px([target.displacement, target.force]);
-      set(group, { transform: `translate(${a} ${b})`, "aria-valuenow": target.displacement, "aria-valuetext": `${figure(target.displacement, 4)} mm at ${figure(target.force)} N`,
-        "aria-label": `Target ${index + 1}: ${figure(target.displacement, 4)} mm at ${figure(target.force)} N; arrow keys move it` });
+      const curve = store.project.curves[target.curve], text = words(curve, target);
+      set(group, { transform: `translate(${a} ${b})`, "aria-valuenow": sampled(curve, target)[1], "aria-valuetext": text, "aria-label": `Target ${index + 1}: ${text}; arrow keys move it` });
       parts.push(group);
     });
     if (parts.length !== this.layers.targets.children.length || parts.some((g, k) => g !== this.layers.targets.children[k])) {
@@ -165,8 +171,9 @@ export class Chart {
   moveTo(event) {
     const { held } = this;
     if (!held) return; // its target was removed elsewhere
-    const [displacement, force] = this.value([event.clientX - held.off[0], event.clientY - held.off[1]]);
-    this.place(held.target, displacement, event.shiftKey ? held.target.force : force);
+    const curve = this.store.project.curves[held.target.curve], [displacement, force] = this.value([event.clientX - held.off[0], event.clientY - held.off[1]]);
+    const [given, wanted] = sampled(curve, { displacement, force });
+    this.place(held.target, event.shiftKey ? sampled(curve, held.target)[0] : given, wanted);
     held.moved = true;
     if (!held.pending) {
       held.pending = true;
@@ -182,12 +189,13 @@ export class Chart {
     held.rest = setTimeout(() => { if (this.held === held) { held.sent = true; this.send(held, false); } }, REST);
   }
 
-  // A target at a place that its curve allows; forces keep to round values.
-  place(target, displacement, force) {
-    const largest = this.store.project.curves[target.curve].largest, sign = Math.sign(largest), unit = Math.abs(largest) / 80;
-    const size = Math.min(Math.max(Math.round(Math.abs(force) / unit) * unit, unit), Math.abs(largest));
-    target.force = Number((sign * (force * sign > 0 ? size : unit)).toPrecision(6));
-    target.displacement = Number((Math.abs(displacement) < 1e-3 ? 1e-3 : displacement).toPrecision(5));
+  // A target at a place that its curve allows; what is prescribed keeps to round values when it changes.
+  place(target, given, wanted) {
+    const curve = this.store.project.curves[target.curve], { largest, held } = curve, [before] = sampled(curve, target);
+    const sign = Math.sign(largest), unit = Math.abs(largest) / 80, least = held ? 1e-3 * (this.limits.y[1] - this.limits.y[0]) : 1e-3;
+    const size = Math.min(Math.max(Math.round(Math.abs(given) / unit) * unit, unit), Math.abs(largest));
+    const at = given === before ? given : Number((sign * (given * sign > 0 ? size : unit)).toPrecision(6));
+    Object.assign(target, placed(curve, at, Number((Math.abs(wanted) < least && !target.scale ? least : wanted).toPrecision(5))));
   }
 
   send(held, settled) {
@@ -219,8 +227,9 @@ export class Chart {
       this.store.edit([{ kind: "remove", path: ["targets", index] }]);
     } else if (move) {
       event.preventDefault(); event.stopPropagation();
-      const force = target.force + move[1] * Math.max(fine * (y[1] - y[0]), Math.abs(this.store.project.curves[target.curve].largest) / 80);
-      this.place(target, target.displacement + move[0] * fine * (x[1] - x[0]), move[1] ? force : target.force);
+      const curve = this.store.project.curves[target.curve], across = move[0] * fine * (x[1] - x[0]), up = move[1] * fine * (y[1] - y[0]);
+      const [given, wanted] = sampled(curve, target), [by, more] = sampled(curve, { displacement: across, force: up });
+      this.place(target, given + Math.sign(by) * Math.max(Math.abs(by), Math.abs(curve.largest) / 80), wanted + more);
       const held = { index, target };
       this.send(held, false);
       this.store.preview();
@@ -242,8 +251,8 @@ export class Chart {
 
   preview() {
     const { store } = this, s = store.previewed, base = store.base(), parts = [];
-    if (s && base && base.curves[store.shown]) {
-      const points = curveAfter(base, store.shown, s).map((p) => this.px(p)), [x, y] = points.at(-1);
+    if (s && base && base.curves[store.shown] && base.curves[store.shown].at.length) {
+      const points = curveAfter(base, store.shown, s, store.project.curves[store.shown]).map((p) => this.px(p)), [x, y] = points.at(-1);
       parts.push(make("path", { class: "preview", d: path(points) }),
         make("text", { class: "preview-name", x: Math.min(x - 8, this.width - 20), y: Math.max(y - 8, 24), "text-anchor": "end" }, "linear preview"));
     }

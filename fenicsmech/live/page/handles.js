@@ -1,7 +1,8 @@
 // What can be dragged in the mechanism: joints, control points and thicknesses of links at rest, and the push on it.
 
-import { controlsAfter, entryOf, lineAfter, nothing, outline } from "./preview.js";
-import { drag, make } from "./svg.js";
+import { controlsAfter, cornersAfter, entryOf, lineAfter, nothing } from "./preview.js";
+import { drag, make, path, set } from "./svg.js";
+import { order } from "./view.js";
 
 const REST = 350; // ms after which a resting gesture is solved
 const FARTHEST = 1.5; // times the largest force of the curve
@@ -18,7 +19,7 @@ export class Handles {
   draw(px) {
     const { layers } = this.view, { store } = this;
     if (store.mode !== "shape") { if (this.shown) { layers.handles.replaceChildren(); this.shown = ""; } return; }
-    if (this.held) { this.follow(px); return; }
+    if (this.held) { this.follow(); return; }
     const wanted = this.list(px), key = JSON.stringify([wanted.map((own) => [own.kind, own.at]), px]);
     if (key === this.shown) return;
     this.shown = key;
@@ -39,8 +40,8 @@ export class Handles {
     found.push(...places.values());
     const number = store.project.forces.findIndex((own) => own.name === store.project.curves[store.shown].force), force = store.project.forces[number];
     const along = force.direction.map((part) => part / Math.hypot(...force.direction)), out = 34 * px;
-    found.push({ kind: "direction", at: force.at.map((part, a) => part + out * along[a]), number, origin: force.at, label: `direction of ${force.name}` },
-      { kind: "force", at: force.at, number, label: `point of ${force.name}` });
+    found.push({ kind: "direction", at: force.at.map((part, a) => part + out * along[a]), number, origin: force.at, name: force.name, label: `direction of ${force.name}` },
+      { kind: "force", at: force.at, number, name: force.name, label: `point of ${force.name}` });
     const shift = this.shift();
     for (const link of store.linear ? store.linear.links : []) link.entries.forEach((entries, k) => {
       const [P, M] = controlsAfter(link, shift)[k], length = Math.hypot(M[0], M[1]) || 1;
@@ -121,7 +122,7 @@ export class Handles {
       const along = held.move[0] * own.normal[0] + held.move[1] * own.normal[1];
       held.move = own.normal.map((part) => part * along);
     }
-    if (own.link || this.along().length) store.previewed = this.step();
+    if (own.link || this.moves().length) store.previewed = this.step();
     if (!held.pending) {
       held.pending = true;
       requestAnimationFrame(() => { held.pending = false; if (this.held === held) { this.view.draw(); store.drawCurve(); } });
@@ -130,17 +131,19 @@ export class Handles {
     held.rest = setTimeout(() => { if (this.held === held) this.send(false); }, REST);
   }
 
-  // Entries of s along x and y of the joints that are held; none if there is no linear preview of them.
-  along() {
-    const { own, linear } = this.held;
-    if (own.kind !== "joint" || !linear) return [];
-    return [0, 1].map((axis) => entryOf(linear, { kind: "joint", joints: own.joints, axis })).filter((entry) => entry >= 0);
+  // Entries of s of the joint, the force or the direction that is held; none if there is no linear preview of it.
+  moves() {
+    const { own: { kind, joints, name }, linear } = this.held;
+    const named = kind === "joint" ? [0, 1].map((axis) => ({ kind, joints, axis }))
+      : kind === "force" ? [0, 1].map((axis) => ({ kind, name, axis })) : kind === "direction" ? [{ kind, name }] : [];
+    return linear ? named.map((own) => entryOf(linear, own)).filter((entry) => entry >= 0) : [];
   }
 
-  // The change by the gesture of parameters and joints.
+  // The change by the gesture of parameters, joints and forces.
   step() {
     const { own, move, shift } = this.held, s = shift.slice();
-    if (own.kind === "joint") this.along().forEach((entry, a) => { s[entry] += move[a]; });
+    if (own.kind === "joint" || own.kind === "force") this.moves().forEach((entry, a) => { s[entry] += move[a]; });
+    else if (own.kind === "direction") this.moves().forEach((entry) => { s[entry] += this.turn(); });
     else if (own.kind === "control") [0, 1].forEach((a) => { s[own.entries[a]] += move[a]; });
     else if (own.kind === "slope") [0, 1].forEach((a) => { s[own.entries[a]] += 3 * move[a]; });
     else {
@@ -150,35 +153,47 @@ export class Handles {
     return s;
   }
 
-  follow(px) {
-    const { own, shape, move, linear } = this.held;
-    shape.setAttribute("transform", `translate(${move[0]} ${move[1]})`);
-    if (own.kind !== "joint" || !this.held.moved) return;
-    // rigid links that meet here, dashed; flexible ones too where the preview does not have them
-    const { store } = this, to = own.at.map((part, a) => part + move[a]), lines = [];
-    const drawn = this.along().length ? linear.links.map((link) => link.name) : [];
-    for (const { link, line } of this.lines()) {
-      if (!drawn.includes(store.project.links[link].name)) lines.push(`M${line.map((point) => point.join(" ")).join("L")}`);
-    }
-    for (const k of own.joints) for (const end of ["a", "b"]) {
-      const name = store.project.joints[k][end], link = store.project.links.find((other) => other.name === name);
-      if (link.kind === "flexible") continue;
-      for (const joint of store.project.joints) {
-        if ([joint.a, joint.b].includes(name) && !own.joints.includes(store.project.joints.indexOf(joint))) lines.push(`M${to.join(" ")}L${joint.at.join(" ")}`);
-      }
-    }
-    if (lines.length) this.view.layers.preview.append(make("path", { class: "preview", d: lines.join("") }));
+  // The angle by which the direction that is held is turned.
+  turn() {
+    const { own: { at, origin }, move } = this.held, [a, b] = [0, 1].map((k) => at[k] - origin[k]), [x, y] = [a + move[0], b + move[1]];
+    return Math.atan2(a * y - b * x, a * x + b * y);
   }
 
-  // Centrelines of the strips that follow the joints that are held.
-  lines() {
+  follow() {
+    const { own, shape, move, linear } = this.held, to = `translate(${move[0]} ${move[1]})`;
+    shape.setAttribute("transform", to);
+    if (own.kind === "direction") set(shape.querySelector(".stem"), { x1: own.origin[0] - move[0], y1: own.origin[1] - move[1] }); // in the shape's own frame
+    if (own.kind === "force") this.view.layers.handles.querySelector(".direction").setAttribute("transform", to);
+    if (own.kind !== "joint" || !this.held.moved) return;
+    // outlines of rigid links that meet here, dashed; flexible ones too where the preview does not have them
+    const previewed = this.moves().length ? linear.links.filter((link) => link.thickness).map((link) => link.name) : [], { links } = this.held.drawn;
+    const flexible = this.shapes().filter(({ link }) => !previewed.includes(links[link].name)).map(({ key, points }) => path(points, key === "corners"));
+    const d = [...flexible, ...this.rigid()].join("");
+    if (d) this.view.layers.preview.append(make("path", { class: "preview", d }));
+  }
+
+  // The outlines of the rigid links that meet at the joints that are held.
+  rigid() {
+    const { own, move, drawn: { joints, links } } = this.held, { forces, outputs } = this.store.project;
+    const meet = new Set(own.joints.flatMap((k) => [joints[k].a, joints[k].b])), found = [];
+    for (const { name, kind } of links) {
+      if (kind !== "rigid" || !meet.has(name)) continue;
+      const held = joints.flatMap((joint, k) => [joint.a, joint.b].includes(name) ? [own.joints.includes(k) ? joint.at.map((part, a) => part + move[a]) : joint.at] : []);
+      const points = order([...held, ...[...forces, ...outputs || []].filter((load) => load.on === name).map((load) => load.at)]);
+      if (points.length > 1) found.push(path(points, points.length > 2));
+    }
+    return found;
+  }
+
+  // Strips and polygons that follow the joints that are held, by the key of their points.
+  shapes() {
     const { own, move, drawn: { joints, links } } = this.held, found = [];
     links.forEach((link, k) => {
-      if (!link.shape || !link.shape.line) return;
+      const key = link.shape && ["line", "corners"].find((name) => name in link.shape);
       const mine = joints.map((joint, j) => [joint, j]).filter(([joint]) => [joint.a, joint.b].includes(link.name));
-      if (!mine.some(([, j]) => own.joints.includes(j))) return;
-      const shifts = mine.map(([, j]) => own.joints.includes(j) ? move : [0, 0]);
-      found.push({ link: k, line: lineAfter(link.shape.line, mine.map(([joint]) => joint.at), shifts) });
+      if (!key || !mine.some(([, j]) => own.joints.includes(j))) return;
+      const shifts = mine.map(([, j]) => own.joints.includes(j) ? move : [0, 0]), after = key === "line" ? lineAfter : cornersAfter;
+      found.push({ link: k, key, points: after(link.shape[key], mine.map(([joint]) => joint.at), shifts) });
     });
     return found;
   }
@@ -190,8 +205,8 @@ export class Handles {
       const to = own.at.map((part, a) => Number((part + held.move[a]).toFixed(2)));
       const changes = own.joints.map((k) => ({ kind: "set", path: ["joints", k, "at"], value: to }));
       held.move = to.map((part, a) => part - own.at[a]); // as rounded
-      for (const { link, line } of this.lines()) {
-        changes.push({ kind: "set", path: ["links", link, "shape", "line"], value: line.map((point) => point.map((part) => Number(part.toFixed(6)))) });
+      for (const { link, key, points } of this.shapes()) {
+        changes.push({ kind: "set", path: ["links", link, "shape", key], value: points.map((point) => point.map((part) => Number(part.toFixed(6)))) });
       }
       store.edit(changes, { settled });
     } else if (own.kind === "force") {

@@ -8,13 +8,14 @@ import { entryOf, nothing, step } from "./preview.js";
 import { Side } from "./side.js";
 import { Solid } from "./solid.js";
 import { figure } from "./svg.js";
+import { placed, sampled, units, untargeted, words } from "./targets.js";
 import { View } from "./view.js";
 
 const $ = (id) => document.getElementById(id);
 
 const store = {
   project: null, mesh: null, curves: {}, errors: {}, peaks: {}, responses: {}, linear: null, misfits: null, first: [],
-  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null,
+  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null, untargeted: "",
 
   curve() { return this.curves[this.shown]; },
   // The mesh of what is drawn: another curve may still be that of an earlier shape.
@@ -72,7 +73,7 @@ const store = {
     return key(this.solid.project) !== key(this.project);
   },
   send(message) { return send(message); },
-  tell(text, error) { tell(text, error); },
+  tell(text, ...more) { tell(text, ...more); },
   fresh,
   show() { show(); },
   showState() { showState(); },
@@ -83,8 +84,11 @@ const store = {
 const HINTS = {
   move: "Drag a target ◆ on the curve, or choose Stiffer: the link changes its shape to follow. Or push it anywhere.",
   solid: "Turn the solid with the pointer or the arrow keys. Solve in 3D to see how far plane stress is from it.",
-  shape: "Drag joints ●, points ■, slopes ○, thicknesses ◆: dashed is where it leads. The force ▲ is solved at rests.",
+  shape: "Drag joints ●, points ■, slopes ○, thicknesses ◆, the force ▲ and its direction: dashed is where it leads.",
 };
+
+// Of the buttons that make and move targets.
+const TITLES = Object.fromEntries(["add", "softer", "stiffer"].map((id) => [id, $(id).title]));
 
 const chart = new Chart($("chart"), store), view = new View($("view"), store);
 const handles = new Handles(view, store), side = new Side($("side"), store);
@@ -108,7 +112,6 @@ const receivers = {
     $("name").textContent = project.name;
     $("add-curve").disabled = $("add-position").disabled = project.curves.length >= store.most.curves;
     $("add-position").hidden = !project.motors.length;
-    $("add").disabled = project.targets.length >= store.most.targets;
     $("undo").disabled = !undo; $("redo").disabled = !redo;
     tabs(); listTargets(); chart.draw(); side.draw();
     if (!handles.held) view.draw();
@@ -219,18 +222,22 @@ function apply(project, changes) {
   }
 }
 
-// A message to the user; null clears them.
-function tell(text, error = false) {
+// A message to the user; null clears them, and the next one clears a passing one.
+function tell(text, error = false, passing = false) {
   if (text === null) { $("told").replaceChildren(); return; }
   const item = document.createElement("li");
   item.textContent = text;
   if (error) item.className = "error";
-  if ([...$("told").children].some((own) => own.textContent === text)) return;
-  $("told").append(item);
+  [...$("told").children].filter((own) => own.textContent === text || own.dataset.passing).forEach((own) => own.remove());
+  if (passing) item.dataset.passing = true;
+  $("told").prepend(item); // the newest is in view
 }
 
 function tabs() {
-  const { curves } = store.project;
+  const { curves, targets } = store.project, none = untargeted(curves[store.shown]);
+  for (const [id, title] of Object.entries(TITLES)) { $(id).disabled = Boolean(none); $(id).title = none || title; }
+  $("add").disabled ||= targets.length >= store.most.targets;
+  if (none !== store.untargeted) { store.untargeted = none; if (store.mode === "move") showHint(); }
   $("tabs").replaceChildren(...(curves.length < 2 ? [] : curves.map((curve, k) => {
     const tab = document.createElement("button");
     tab.textContent = curve.name;
@@ -241,16 +248,17 @@ function tabs() {
   })));
 }
 
-// Displacement of the shown design at a force, with its estimated error, interpolated between frames.
-function reached(target) {
-  const own = store.curves[target.curve], errors = store.errors[target.curve] || [];
+// Displacement of the shown design at a force, or force at a displacement that is held, with its estimated error,
+// interpolated between frames.
+function reached(number, given) {
+  const own = store.curves[number], errors = store.errors[number] || [];
   if (!own) return null;
   for (let k = 0; k + 1 < own.points.length; k++) {
-    const a = own.points[k], b = own.points[k + 1], span = b.force - a.force;
-    const t = span ? (target.force - a.force) / span : -1;
+    const [[from, a], [to, b]] = [k, k + 1].map((at) => sampled(store.project.curves[number], own.points[at]));
+    const t = to === from ? -1 : (given - from) / (to - from);
     if (t >= -1e-9 && t <= 1 + 1e-9) {
       const error = (errors[k] || 0) * (1 - t) + (errors[k + 1] || 0) * t;
-      return { value: a.displacement + t * (b.displacement - a.displacement) + error, error };
+      return { value: a + t * (b - a) + error, error };
     }
   }
   return null;
@@ -291,12 +299,12 @@ function listTargets() {
     const [text, mark, remove] = item.children;
     mark.textContent = mark.className = "";
     delete item.dataset.miss;
-    text.textContent = `◆ ${figure(target.displacement, 4)} mm at ${figure(target.force)} N`;
-    const now = reached(target);
+    const curve = store.project.curves[target.curve], [given, wanted] = sampled(curve, target), now = reached(target.curve, given);
+    text.textContent = `◆ ${words(curve, target)}`;
     if (now) {
-      const miss = (now.value - target.displacement) / Math.abs(target.displacement);
+      const miss = (now.value - wanted) / (target.scale || Math.abs(wanted));
       const error = Math.abs(now.error) > 0 ? ` ± ${figure(Math.abs(now.error), 1)}` : "";
-      mark.textContent = `reached ${figure(now.value, 4)}${error} mm (${miss < 0 ? "−" : "+"}${figure(100 * Math.abs(miss), 2)} %)`;
+      mark.textContent = `reached ${figure(now.value, 4)}${error} ${units(curve)[1]} (${miss < 0 ? "−" : "+"}${figure(100 * Math.abs(miss), 2)} %)`;
       mark.className = Math.abs(miss) <= 0.01 ? "met" : "missed";
       item.dataset.miss = miss;
     }
@@ -314,18 +322,21 @@ $("add").onclick = () => {
   const own = store.curve(), points = own ? own.points : [];
   const at = points[Math.max(1, Math.round(store.load * (points.length - 1)))];
   if (!at) return;
+  const curve = store.project.curves[store.shown], [given, wanted] = sampled(curve, at), most = Math.max(...points.map((own) => Math.abs(sampled(curve, own)[1])));
   store.edit([{ kind: "insert", path: ["targets", store.project.targets.length],
-    value: { curve: store.shown, force: at.force, displacement: Number(at.displacement.toPrecision(4)) || 0.1, weight: 1 } }]);
+    value: { curve: store.shown, ...placed(curve, given, Number(wanted.toPrecision(4)) || 0.1 * most || 0.1), weight: 1 } }]);
 };
-// All targets of the shown curve at displacements that are a factor smaller; without targets there is one at its end.
+// All targets of the shown curve at displacements that are a factor smaller, or forces that are larger where
+// displacements are held; without targets there is one at its end.
 function stiffen(factor) {
   const { project, shown } = store, own = store.curve(), changes = [], mine = project.targets.filter((target) => target.curve === shown);
+  const curve = project.curves[shown], [name, by] = curve.held ? ["force", factor] : ["displacement", 1 / factor], changed = (at) => Number((at[name] * by).toPrecision(5));
   project.targets.forEach((target, k) => {
-    if (target.curve === shown) changes.push({ kind: "set", path: ["targets", k, "displacement"], value: Number((target.displacement / factor).toPrecision(5)) });
+    if (target.curve === shown && target[name]) changes.push({ kind: "set", path: ["targets", k, name], value: changed(target) });
   });
   const end = own && own.points.at(-1);
   if (!mine.length && end && end.force) changes.push({ kind: "insert", path: ["targets", project.targets.length],
-    value: { curve: shown, force: end.force, displacement: Number((end.displacement / factor).toPrecision(5)), weight: 1 } });
+    value: { curve: shown, force: end.force, displacement: end.displacement, weight: 1, [name]: changed(end) } });
   if (changes.length) store.edit(changes, { fit: true });
 }
 const share = () => Math.min(Math.max(Number($("by").value) || 20, 1), 90) / 100;
@@ -373,9 +384,14 @@ for (const mode of ["move", "shape", "solid"]) $(`mode-${mode}`).onclick = () =>
   for (const own of ["move", "shape", "solid"]) $(`mode-${own}`).setAttribute("aria-pressed", own === mode);
   $("view").dataset.mode = document.body.dataset.mode = mode;
   $("scale-high").textContent = `${figure(store.stressTop)} MPa`;
-  $("hint").textContent = HINTS[mode];
+  showHint();
   show();
 };
+
+function showHint() {
+  const none = store.mode === "move" && store.untargeted;
+  $("hint").textContent = none ? `${none}. Push the mechanism anywhere, or change its shape.` : HINTS[store.mode];
+}
 
 function showPlaying() {
   $("play").setAttribute("aria-pressed", playing);
@@ -401,9 +417,9 @@ function showState() {
 function compareSolid() {
   const { solid: own } = store;
   if (store.mode !== "solid" || store.solving || !own || !own.points.length || own.curve !== store.shown) return;
-  const end = own.points.at(-1), now = reached({ curve: own.curve, force: end.force }), error = own.errors ? own.errors.at(-1) : 0;
-  const value = end.displacement + error, less = now && value ? (now.value - value) / Math.abs(value) : 0;
-  const text = `${figure(value, 4)}${error ? ` ± ${figure(Math.abs(error), 1)}` : ""} mm at ${figure(end.force)} N`;
+  const curve = store.project.curves[own.curve], end = own.points.at(-1), [given, found] = sampled(curve, end), now = reached(own.curve, given), error = own.errors ? own.errors.at(-1) : 0;
+  const value = found + error, less = now && value ? (now.value - value) / Math.abs(value) : 0, [at, of] = units(curve);
+  const text = `${figure(value, 4)}${error ? ` ± ${figure(Math.abs(error), 1)}` : ""} ${of} at ${figure(given)} ${at}`;
   $("solid-state").textContent = store.stale() ? `${text}, of an earlier shape` : `${text}${now ? `; plane: ${less < 0 ? "−" : "+"}${figure(100 * Math.abs(less), 2)} %` : ""}`;
 }
 

@@ -2,28 +2,31 @@
 //
 //   min over s   Σ ½ w (Q + e + J s − wanted)² / scale² + gᵀ s + ½ sᵀ H s + ½ μ |s / ℓ|²,   s within bounds of thickness.
 //
-// After the parameters, s has how far joints and motors are moved, which are as drawn in that step.
+// After the parameters, s has how far joints, motors and forces are moved, which are as drawn in that step. Q are
+// displacements under forces, or forces where displacements are held.
 
 import { dot, solve } from "./algebra.js";
+import { placed, sampled } from "./targets.js";
 
 const DAMPING = 1e-4;
+const REACH = 2; // typical changes of parameters, up to which a step is drawn: steps for targets that contradict are damped more
 
 // The step of no gesture.
 export const nothing = (linear) => new Array(linear.lengths.length + linear.moves.length).fill(0);
 
-// The entry of s of a joint along an axis, or of a motor; −1 if there is none.
+// The entry of s of a joint or a force along an axis, of a direction, or of a motor; −1 if there is none.
 export function entryOf(linear, wanted) {
   const key = JSON.stringify(wanted), k = linear.moves.findIndex((own) => JSON.stringify(own) === key);
   return k < 0 ? -1 : linear.lengths.length + k;
 }
 
-// Value and derivatives of a curve at a force between those of its frames.
-function row(curve, force, size) {
-  const forces = [0, ...curve.forces], k = forces.findIndex((f) => Math.abs(f) >= Math.abs(force) - 1e-12);
+// Value and derivatives of a curve between those of its frames.
+function row(curve, given, size) {
+  const places = [0, ...curve.at], k = places.findIndex((own) => Math.abs(own) >= Math.abs(given) - 1e-12);
   const at = (j) => j === 0 ? { value: 0, slopes: new Array(size).fill(0) }
     : { value: curve.values[j - 1] + curve.errors[j - 1], slopes: curve.jacobian[j - 1] };
-  const last = forces.length - 1, high = k < 0 ? last : Math.max(k, 1), low = high - 1;
-  const t = (force - forces[low]) / (forces[high] - forces[low]), a = at(low), b = at(high);
+  const last = places.length - 1, high = k < 0 ? last : Math.max(k, 1), low = high - 1;
+  const t = (given - places[low]) / (places[high] - places[low]), a = at(low), b = at(high);
   return { value: a.value + t * (b.value - a.value), slopes: a.slopes.map((slope, j) => slope + t * (b.slopes[j] - slope)) };
 }
 
@@ -46,17 +49,26 @@ function bounds(linear, project) {
 
 // The step for the targets of a project.
 export function step(linear, project) {
-  const n = linear.lengths.length, largest = Math.max(...project.targets.map((t) => Math.abs(t.displacement)), 1e-9);
-  const A = linear.curvature.map((line, i) => line.map((value, j) => value + (i === j ? DAMPING / linear.lengths[i] ** 2 : 0)));
+  for (let damping = DAMPING; damping < 1e3; damping *= 10) {
+    const s = damped(linear, project, damping);
+    if (!s || linear.lengths.every((length, k) => Math.abs(s[k]) <= REACH * length)) return s;
+  }
+  return null;
+}
+
+function damped(linear, project, damping) {
+  const n = linear.lengths.length, wants = project.targets.map((own) => [project.curves[own.curve], ...sampled(project.curves[own.curve], own)]);
+  const A = linear.curvature.map((line, i) => line.map((value, j) => value + (i === j ? damping / linear.lengths[i] ** 2 : 0)));
   const b = linear.gradient.map((value) => -value);
-  for (const target of project.targets) {
-    const { value, slopes } = row(linear.curves[target.curve], target.force, n);
-    const weight = target.weight / Math.max(Math.abs(target.displacement), 0.1 * largest) ** 2;
+  project.targets.forEach((target, k) => {
+    const [{ held }, given, wanted] = wants[k], { value, slopes } = row(linear.curves[target.curve], given, n);
+    const largest = Math.max(...wants.filter(([own]) => Boolean(own.held) === Boolean(held)).map((own) => Math.abs(own[2])), 1e-9);
+    const weight = target.weight / (target.scale || Math.max(Math.abs(wanted), 0.1 * largest)) ** 2;
     for (let i = 0; i < n; i++) {
-      b[i] += weight * slopes[i] * (target.displacement - value);
+      b[i] += weight * slopes[i] * (wanted - value);
       for (let j = 0; j < n; j++) A[i][j] += weight * slopes[i] * slopes[j];
     }
-  }
+  });
   const [low, high] = bounds(linear, project), held = new Map();
   for (let round = 0; round < 6; round++) {
     const free = [...Array(n).keys()].filter((k) => !held.has(k));
@@ -75,10 +87,13 @@ export function step(linear, project) {
   return null;
 }
 
-// Displacements of a curve's frames after a step, from zero force on, as [displacement, force].
-export function curveAfter(linear, number, s) {
+// Frames of a curve after a step, from zero on, as [displacement, force].
+export function curveAfter(linear, number, s, curve) {
   const own = linear.curves[number];
-  return [[0, 0], ...own.forces.map((force, k) => [own.values[k] + own.errors[k] + dot(own.jacobian[k], s), force])];
+  return [[0, 0], ...own.at.map((given, k) => {
+    const { displacement, force } = placed(curve, given, own.values[k] + own.errors[k] + dot(own.jacobian[k], s));
+    return [displacement, force];
+  })];
 }
 
 // Control points of a link after a step.
@@ -99,6 +114,15 @@ export function lineAfter(line, places, shifts) {
     if (next <= 0) { const shift = sites.at(next)[1]; return [point[0] + shift[0], point[1] + shift[1]]; } // before the first, after the last
     const [[from, a], [to, b]] = [sites[next - 1], sites[next]], t = (lengths[k] - from) / (to - from);
     return [0, 1].map((axis) => point[axis] + a[axis] + t * (b[axis] - a[axis]));
+  });
+}
+
+// Corners of a polygon whose joints at some places are shifted: means of the shifts with weights that fall with the
+// square of the distance, so that the surroundings of a joint go with it.
+export function cornersAfter(corners, places, shifts) {
+  return corners.map(([x, y]) => {
+    const weights = places.map(([a, b]) => 1 / Math.max((a - x) ** 2 + (b - y) ** 2, 1e-12)), sum = weights.reduce((p, q) => p + q, 0);
+    return [x, y].map((part, axis) => part + dot(weights, shifts.map((own) => own[axis])) / sum);
   });
 }
 

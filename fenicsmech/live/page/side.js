@@ -46,7 +46,8 @@ export class Side {
         const ratio = value / curve.largest, changes = [{ kind: "set", path: ["curves", n, "largest"], value }];
         if (!(ratio > 0)) return;
         this.store.project.targets.forEach((target, k) => {
-          if (target.curve === n && Math.abs(target.force) > Math.abs(value)) changes.push({ kind: "set", path: ["targets", k, "force"], value });
+          const given = curve.held ? "displacement" : "force";
+          if (target.curve === n && Math.abs(target[given]) > Math.abs(value)) changes.push({ kind: "set", path: ["targets", k, given], value });
         });
         this.store.edit(changes);
       }),
@@ -117,8 +118,8 @@ export class Side {
   // Fetches a file when the shape has settled, and saves it.
   async save(what, label) {
     const { store } = this;
-    if (store.busy) { store.tell(`${label} comes when the shape has settled…`); await new Promise((go) => store.waiting.push(go)); }
-    if (!["project", "script"].includes(what)) store.tell(`${label} is being made…`);
+    if (store.busy) { store.tell(`${label} comes when the shape has settled…`, false, true); await new Promise((go) => store.waiting.push(go)); }
+    if (!["project", "script"].includes(what)) store.tell(`${label} is being made…`, false, true);
     const found = await fetch(`export/${what}`).catch(() => null);
     if (!found) store.tell("Not connected. Is the program still running?", true);
     if (!found || !found.ok) return; // the server tells why

@@ -15,7 +15,9 @@ export class View {
       return [name, layer];
     }));
     this.note = make("text", { class: "preview-name", x: 6, y: 14 }, "– – linear preview");
-    svg.append(this.world, this.note);
+    this.note.style.display = "none";
+    this.waiting = make("text", { x: "50%", y: "50%", "text-anchor": "middle" }, "The mechanism appears with its first curve…");
+    svg.append(this.world, this.note, this.waiting);
     new ResizeObserver(() => { this.fit(); this.draw(); }).observe(svg);
   }
 
@@ -76,6 +78,7 @@ export class View {
     const state = this.state();
     if (!state || state.nodes.length !== mesh.flexible.length || state.rigid.length !== mesh.rigid.length) return;
     this.now = state;
+    this.waiting.remove();
     const px = 1 / this.scale;
     const rigid = [];
     state.rigid.forEach((points, k) => {
@@ -134,9 +137,9 @@ export class View {
   preview() {
     const { store } = this, s = store.previewed, base = store.base(), lean = store.lean(), parts = [], mesh = store.drawnMesh();
     if (s && base && !lean) for (const link of base.links) {
-      if (!link.thickness) continue;
-      const d = path(outline(controlsAfter(link, s), link.thickness), true);
-      parts.push(make("path", { class: "preview", d  }));
+      const after = controlsAfter(link, s);
+      if (!link.thickness || String(after) === String(link.controls)) continue; // a force that moves shapes no link
+      parts.push(make("path", { class: "preview", d: path(outline(after, link.thickness), true) }));
     }
     if (lean && lean.state.nodes.length === mesh.flexible.length) {
       const { nodes, rigid } = leaned(lean), rims = mesh.flexible.flatMap((link, k) => link.loops.map((loop) => path(loop.map((own) => nodes[k][own]), true)));
