@@ -19,17 +19,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenicsmech.errors import DescriptionError, counted, finite, real_array
 
-
 _LONGEST = 150
 """Bytes of a name of a file that is made from another name: file systems take 255, with ends and those of copies."""
 
 
 def file_name(name: str, taken: Iterable[str] = ()) -> str:
-    """A name of a file, without its ending, for a part of any name: letters and digits of any script, ``.``, ``_``, ``-``.
+    """A name of a file, without its ending, for a part of any name: of letters and digits, ``.``, ``_`` and ``-``.
 
     Args:
         name: whose other characters become ``-``; a path in it leads nowhere.
-        taken: names of files that the result differs from, by more than upper case, which not all file systems tell apart.
+        taken: names of files that it differs from, in more than upper case: some file systems ignore it.
     """
     safe = re.sub(r"[^\w.-]", "-", unicodedata.normalize("NFC", name)).lstrip(".-")
     stem = safe.encode()[:_LONGEST].decode(errors="ignore").rstrip(".") or "part"

@@ -7,7 +7,7 @@
 - ``session``: project, history, and what a gesture leads to
 - ``server``: static files and a WebSocket on 127.0.0.1; ``solver``: the process that computes, ended at any time
 - ``responses``: linear ones of what the page draws; ``grip``: a point that the pointer holds
-- ``cancel``: equilibria that a new gesture ends at their next iteration; ``told``: problems with their remedies
+- ``cancel``: equilibria that a new gesture ends at their next iteration; ``problems``, with their remedies
 - ``solid``: the process that solves in space; ``job``: runs it
 - ``build``: the simulation and the design problem of a project; ``script``: the Python script that does the same
 - ``stored``: first results for the next start, shown before the solver is up
@@ -29,6 +29,8 @@ from fenicsmech.live.job import Job
 from fenicsmech.live.messages import LARGEST, PER_SECOND, read_message
 from fenicsmech.live.project import (
     FORMAT,
+    LARGEST_PROJECT,
+    MOST_ELEMENTS,
     Project,
     edited,
     example,

@@ -63,6 +63,32 @@ def _only_solid(path: Path, request: MeshRequest) -> DimTag:
     return solids[0]
 
 
+def plan_size(shape: StepPart | MeshPart, part: str) -> tuple[float, int]:
+    """How much there is to mesh of a link from a file, before it is meshed.
+
+    Args:
+        shape: with its file.
+        part: for messages.
+
+    Returns:
+        The mean section of a STEP file's solids along z, in mm², and the number of elements of a mesh file.
+
+    Raises:
+        MeshingError: the file cannot be read.
+    """
+    with gmsh_session(part):
+        if isinstance(shape, MeshPart):
+            gmsh.merge(str(shape.path))
+            counts = [sum(map(len, gmsh.model.mesh.getElements(dim)[1])) for dim in (2, 3)]
+            return 0.0, counts[1] or counts[0]
+        occ, area = gmsh.model.occ, 0.0
+        for dim, tag in occ.importShapes(str(shape.path), format="step"):
+            if dim == 3:
+                _, _, bottom, _, _, top = occ.getBoundingBox(dim, tag)
+                area += abs(occ.getMass(dim, tag)) / (top - bottom)
+    return area, 0
+
+
 def _mesh_solid(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:
     solids = _upper_half(shape, solid, request) if request.half else [solid]
     cutters = [region_prism(site, solids) for site in request.sites]

@@ -249,6 +249,8 @@ def test_a_link_from_a_file_takes_its_file_along(tmp_path):
     assert "/" not in json.dumps([own.get("shape", {}).get("name", "") for own in project["links"]])
     (own,) = drawing.simulation.scene.mechanism.flexible_links
     assert own.shape.path.read_bytes() == Path("meshes/diagonal.step").read_bytes()
+    with pytest.raises(fm.DescriptionError, match="elements of 0.1 mm, not at most"):
+        draw({**project, "simulation": {**project["simulation"], "size": 0.1}})
     assert 'fm.step_file(Path("part_diagonal.step")' in script(project).replace("'", '"')
 
 

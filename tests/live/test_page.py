@@ -92,7 +92,7 @@ class Page:
         """Waits for a condition in JavaScript, and returns its value."""
         end = monotonic() + seconds
         while not (found := self.run(f"return {condition}")):
-            assert monotonic() < end, f"in vain: {condition}; {self.run('return document.body.innerText')}"
+            assert monotonic() < end, f"not in time: {condition}; {self.run('return document.body.innerText')}"
             sleep(0.05)
         return found
 
@@ -528,8 +528,8 @@ def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
     project = project_of(fm.DesignProblem(sim, **switch.wanted(*described)))
     page.chrome.execute_script("live.send({kind: 'open', project: arguments[0]})", project)
     page.until("live.store.project.name === 'switch' && live.store.required.length === 2")
-    told = [item.text for item in page.chrome.find_elements(By.CSS_SELECTOR, "#carried li")]
-    assert len(told) == 3 and all("reached" in own for own in told[:2]) and "spring" in told[2]
+    listed = [item.text for item in page.chrome.find_elements(By.CSS_SELECTOR, "#carried li")]
+    assert len(listed) == 3 and all("reached" in own for own in listed[:2]) and "spring" in listed[2]
     assert page.run("return live.store.curves[0].points.at(-1).displacement") == pytest.approx(15.0)
     page.picture("script")
     page.run("live.send({kind: 'example', name: 'truss-finger'})")
@@ -553,7 +553,7 @@ def motor_page(page):
 def test_the_slider_of_a_motor_is_the_same_while_it_is_dragged(motor_page):
     page, seen = motor_page, []
     slider = page.chrome.find_element(By.CSS_SELECTOR, "#side input[type=range]")
-    # what is told at the foot of the page takes room from the panel, which scrolls
+    # what is said at the foot of the page takes room from the panel, which scrolls
     page.chrome.execute_script("arguments[0].scrollIntoView({block: 'center'})", slider)
 
     def during():
