@@ -16,6 +16,7 @@ import pytest
 import fenicsmech as fm
 from fenicsmech.live import (
     Refused,
+    ServerOptions,
     Solver,
     draw,
     example,
@@ -283,6 +284,11 @@ def test_what_has_no_plain_data_is_refused_by_name(change, reason, remedy):
 def test_a_result_is_opened_with_a_problem_alone():
     with pytest.raises(fm.DescriptionError, match="with a project"):
         live(example("truss-finger"), result=object())
+
+
+def test_a_port_is_given_once():
+    with pytest.raises(fm.DescriptionError, match="beside the options"):
+        live(example("truss-finger"), port=8000, options=ServerOptions())
 
 
 @pytest.mark.parametrize(

@@ -14,17 +14,20 @@ const $ = (id) => document.getElementById(id);
 
 const store = {
   project: null, mesh: null, curves: {}, errors: {}, peaks: {}, responses: {}, linear: null, misfits: null, first: [],
-  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null,
+  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null,
 
   curve() { return this.curves[this.shown]; },
   // The mesh of what is drawn: another curve may still be that of an earlier shape.
   drawnMesh() { const own = this.curve(); return !this.pushed && own ? own.mesh : this.mesh; },
   // The shown curve as it was when the project was opened; null if its load is another one.
   before() {
-    const curve = this.project.curves[this.shown], key = (force, { positions, others }) => JSON.stringify([force, positions, others]);
+    const curve = this.project.curves[this.shown];
+    const key = (force, { positions, others, held, ratios, largest }) => JSON.stringify([force, positions, others, held || false, ratios || null, Math.sign(largest)]);
     const now = key(this.project.forces.find((own) => own.name === curve.force), curve);
     return this.first.find((own) => key(own.force, own) === now) || null;
   },
+  // Whether the page can add and move targets of the shown curve.
+  takesTargets() { const { held, ratios } = this.project.curves[this.shown]; return !held && !ratios; },
   // What a preview is a step from.
   base() { return handles.held ? handles.held.linear : this.turning ? this.turning.linear : this.linear; },
   // A state with linear responses and amounts of these, which is drawn dashed; null if there is none.
@@ -108,7 +111,6 @@ const receivers = {
     $("name").textContent = project.name;
     $("add-curve").disabled = $("add-position").disabled = project.curves.length >= store.most.curves;
     $("add-position").hidden = !project.motors.length;
-    $("add").disabled = project.targets.length >= store.most.targets;
     $("undo").disabled = !undo; $("redo").disabled = !redo;
     tabs(); listTargets(); chart.draw(); side.draw();
     if (!handles.held) view.draw();
@@ -126,7 +128,7 @@ const receivers = {
     if (!store.busy) store.waiting.splice(0).forEach((go) => go());
     $("fit").title = store.busy ? "Stop solving" : "Let the shape follow the targets once more";
   },
-  refused({ place, problem }) { store.added = null; tell(`${place ? `${place}: ` : ""}${problem}`, true); },
+  refused({ place, problem }) { store.added = null; handles.failed(); tell(`${place ? `${place}: ` : ""}${problem}`, true); },
   mesh(event) { store.mesh = event; },
   iterate({ number, design, misfits }) {
     store.project.design = design;
@@ -138,6 +140,7 @@ const receivers = {
   curve(event) {
     store.curves[event.curve] = { ...event, mesh: store.mesh };
     delete store.errors[event.curve]; delete store.peaks[event.curve];
+    if (event.iterate === null) delete store.responses[event.curve]; // those of this curve follow, if it has any
     store.pushed = store.leaning = null;
     if (store.turning && store.turning.over) store.turning = null;
     if (!store.drag && !handles.held && !store.turning) store.previewed = null;
@@ -164,7 +167,6 @@ const receivers = {
   },
   linear(event) {
     store.linear = event;
-    store.active = event.active;
     if (!event.whole) tell("The linear preview ends where a curve snaps, ends or is unstable.");
     if (event.active.length) tell(`Held back by ${event.active.join(", ")}. Widen these bounds, or relax a target.`);
     if (store.turning) { store.turning.linear = event; store.turned(); }
@@ -280,6 +282,9 @@ function stiffness() {
 
 function listTargets() {
   stiffness();
+  const open = store.takesTargets();
+  $("add").disabled = !open || store.project.targets.length >= store.most.targets;
+  $("stiffer").disabled = $("softer").disabled = !open;
   const targets = store.targets(), kept = [...$("targets").children]; // a button that is being pressed stays
   targets.forEach((target, k) => {
     if (target.curve !== store.shown) return;
