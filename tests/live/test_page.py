@@ -531,10 +531,13 @@ def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
     listed = [item.text for item in page.chrome.find_elements(By.CSS_SELECTOR, "#carried li")]
     assert len(listed) == 3 and all("reached" in own for own in listed[:2]) and "spring" in listed[2]
     assert page.run("return live.store.curves[0].points.at(-1).displacement") == pytest.approx(15.0)
+    buttons = [page.chrome.find_element(By.ID, name) for name in ("add", "stiffer", "softer")]
+    assert not any(own.is_enabled() for own in buttons)  # its curve is one of held displacements
     page.picture("script")
     page.run("live.send({kind: 'example', name: 'truss-finger'})")
     page.until("live.store.project.name === 'truss finger' && !document.querySelector('#carried li')")
     page.settled()
+    assert all(own.is_enabled() for own in buttons)
 
 
 @pytest.fixture
