@@ -201,7 +201,7 @@ const receivers = {
 
 const transmit = connect(
   (event) => { const receive = receivers[event.event]; if (receive) receive(event); },
-  () => { $("state").textContent = "Not connected. Is the program still running?"; },
+  () => { handles.failed(); $("state").textContent = "Not connected. Is the program still running?"; },
 );
 
 // A message to the server.
