@@ -163,6 +163,9 @@ $(BENCHMARKS:%=table-%): table-%: install
 	$(call heading,benchmark $*)
 	$(BENCH).$* --write
 
+# a browser, CalculiX, the tests
+table-live table-verification tables: install-test
+
 clean: ## remove what the targets above left in this tree
-	rm -rf .venv results docs/_build .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv results docs/_build .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -167,7 +167,7 @@ def until(browser: Chrome, condition: str) -> None:
     """Waits for a condition in JavaScript."""
     end = perf_counter() + LONGEST
     while not browser.execute_script(f"return {condition}"):
-        assert perf_counter() < end, f"in vain: {condition}"
+        assert perf_counter() < end, f"not in time: {condition}"
         sleep(0.005)
 
 

@@ -30,7 +30,9 @@ def command(description: str) -> argparse.ArgumentParser:
     return parser
 
 
-def publish(name: str, text: str, *, write: bool, folder: Path = ROOT / "docs" / "tables") -> None:
+def publish(
+    name: str, text: str, *, write: bool, folder: Path = ROOT / "docs" / "tables", commit: str | None = None
+) -> None:
     """Prints a benchmark's tables, with machine and commit below them (call on one rank).
 
     Args:
@@ -38,24 +40,30 @@ def publish(name: str, text: str, *, write: bool, folder: Path = ROOT / "docs" /
         text: its tables, in Markdown.
         write: whether they become a page of ``folder``, NAME.md with hyphens, for other pages to include.
         folder: of the generated tables.
+        commit: that they are of; the present one by default.
     """
-    text = f"{text}\n\n{provenance()}\n"
+    text = f"{text}\n\n{provenance(commit)}\n"
     print(text, flush=True)
     if write:
         with atomic_write(folder / f"{name.replace('_', '-')}.md") as file:
             file.write(text)
 
 
-def provenance() -> str:
-    """The commit, the versions and the machine that a measurement belongs to."""
+def revision(*folders: str) -> str:
+    """The present commit, and whether files were changed since, in these folders or anywhere."""
 
     def git(*arguments: str) -> str:
         done = subprocess.run(["git", "-C", ROOT, *arguments], capture_output=True, text=True)
         return done.stdout.strip() if done.returncode == 0 else ""
 
-    changed = ", changed since" if git("status", "--porcelain", "--untracked-files=no") else ""
+    changed = ", changed since" if git("status", "--porcelain", "--untracked-files=no", "--", *folders) else ""
+    return f"{git('rev-parse', '--short', 'HEAD') or 'unknown'}{changed}"
+
+
+def provenance(commit: str | None = None) -> str:
+    """The commit, by default the present one, the versions and the machine that a measurement belongs to."""
     return (
-        f"Commit {git('rev-parse', '--short', 'HEAD') or 'unknown'}{changed}; dolfinx {dolfinx.__version__}; "
+        f"Commit {commit or revision()}; dolfinx {dolfinx.__version__}; "
         f"{_processor()}, {os.cpu_count()} cores; {counted(MPI.COMM_WORLD.size, 'process', 'processes')}."
     )
 

@@ -6,9 +6,11 @@ import csv
 import json
 import math
 import os
+import re
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -17,13 +19,41 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenicsmech.errors import DescriptionError, counted, finite, real_array
 
+_LONGEST = 150
+"""Bytes of a name of a file that is made from another name: file systems take 255, with ends and those of copies."""
+
+
+def file_name(name: str, taken: Iterable[str] = ()) -> str:
+    """A name of a file, without its ending, for a part of any name: of letters and digits, ``.``, ``_`` and ``-``.
+
+    Args:
+        name: whose other characters become ``-``; a path in it leads nowhere.
+        taken: names of files that it differs from, in more than upper case: some file systems ignore it.
+    """
+    safe = re.sub(r"[^\w.-]", "-", unicodedata.normalize("NFC", name)).lstrip(".-")
+    stem = safe.encode()[:_LONGEST].decode(errors="ignore").rstrip(".") or "part"
+    folded = {own.casefold() for own in taken}
+    found, number = stem, 1
+    while found.casefold() in folded:
+        found, number = f"{stem}-{number + 1}", number + 1
+    return found
+
+
+def file_names(names: Iterable[str]) -> list[str]:
+    """Names of files in one folder, without their endings, for parts of these names."""
+    found: list[str] = []
+    for name in names:
+        found.append(file_name(name, found))
+    return found
+
 
 @contextmanager
 def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
     """Opens ``path`` for UTF-8 text or bytes; it is replaced only when the block ends without an error.
 
-    The data go to a hidden file in the same folder, synchronised with the disk and then renamed: an interrupted run
-    leaves the old file untouched and nothing beside it. Missing parent folders are created.
+    The data go to a hidden file in the same folder, synchronised with the disk and then renamed, and so is the folder:
+    an interrupted run leaves the old file untouched and nothing beside it, a killed one leaves a hidden ``.tmp``.
+    Missing parent folders are created.
     """
     target = Path(path)
     text: dict[str, Any] = {} if binary else {"encoding": "utf-8", "newline": "\n"}
@@ -37,9 +67,22 @@ def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, target)
+        _synchronise(target.parent)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def _synchronise(folder: Path) -> None:
+    """Writes the names of a folder's files to the disk, where the system can."""
+    if os.name != "posix":
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with suppress(OSError):  # some file systems of networks refuse it
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def write_json(path: str | Path, data: Mapping[str, object]) -> None:

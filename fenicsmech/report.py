@@ -33,7 +33,7 @@ from fenicsmech.design import DesignProblem, DesignResult
 from fenicsmech.equilibrium import Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted, point_text, with_error
 from fenicsmech.estimates import AccuracyOptions
-from fenicsmech.files import write_json
+from fenicsmech.files import file_names, write_json
 from fenicsmech.log import logger, print_once
 from fenicsmech.mechanism import Force, ForceGroup, Mechanism
 from fenicsmech.plot import PALETTE, CurveTarget, draw_configurations, plot_curve
@@ -110,8 +110,9 @@ def write_report(
         optimisation.result.save(folder / "design.json", comm=comm)
     units, errors = simulation.scene.units, [_errors(curve) for curve in curves]
     panels = [panel for curve in curves if (panel := curve.panel()) is not None]  # on rank 0
-    for curve, known in zip(curves, errors, strict=True):
-        suffix = f"-{_file_name(curve)}" if len(curves) > 1 else ""
+    names = file_names(curve.configuration.name for curve in curves)
+    for curve, known, own in zip(curves, errors, names, strict=True):
+        suffix = f"-{own}" if len(curves) > 1 else ""
         curve.write(folder / f"deformed{suffix}.xdmf")
         curve.write_csv(folder / f"curve{suffix}.csv", errors=known is not None)
     summary = _summarise(simulation, curves, errors, optimisation)
@@ -177,7 +178,7 @@ def _check_curves(where: str, curves: Sequence[Curve]) -> None:
     """Refuses curves that do not make one report."""
     if not curves:
         raise DescriptionError(where, "there are no curves", "Give at least one")
-    names = [_file_name(curve) for curve in curves]
+    names = [curve.configuration.name for curve in curves]
     for curve, name in zip(curves, names, strict=True):
         if names.count(name) > 1:
             raise DescriptionError(
@@ -190,11 +191,6 @@ def _check_curves(where: str, curves: Sequence[Curve]) -> None:
             raise DescriptionError(
                 where, f"the curves of {first} and {other} have no axes in common", "Write a report on each"
             )
-
-
-def _file_name(curve: Curve) -> str:
-    """What the names of the curve's files end in where there are several curves."""
-    return curve.configuration.name.replace(" ", "-")
 
 
 def _again(mechanism: Mechanism, curve: Curve) -> Callable[[Simulation], Curve]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenicsmech.errors import DescriptionError
-from fenicsmech.files import atomic_write, write_json
+from fenicsmech.files import atomic_write, file_name, file_names, write_json
 
 
 def test_a_finished_block_replaces_the_file_and_creates_its_folders(tmp_path):
@@ -51,6 +51,36 @@ def test_files_get_the_permissions_of_the_user(tmp_path):
     with atomic_write(tmp_path / "atomic"):
         pass
     assert (tmp_path / "atomic").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("left leg", "left-leg"),
+        ("../x", "x"),
+        ("/x", "x"),
+        (r"c:\x", "c--x"),
+        ("..", "part"),
+        (".hidden", "hidden"),
+        ("Lösung_2.5", "Lösung_2.5"),
+        ("梁", "梁"),
+        ("a\0b", "a-b"),
+    ],
+)
+def test_a_name_is_one_of_a_file_in_its_folder(name, file, tmp_path):
+    assert file_name(name) == file
+    path = tmp_path / f"{file}.step"
+    path.touch()
+    assert path.resolve().parent == tmp_path.resolve()
+
+
+def test_files_of_one_folder_differ_whatever_their_parts_are_called(tmp_path):
+    names = ["a b", "a-b", "A/b", "a-b-2", "...", "", "梁" * 160, "梁" * 159]
+    found = file_names(names)
+    assert found[:4] == ["a-b", "a-b-2", "A-b-3", "a-b-2-2"] and len({own.casefold() for own in found}) == len(names)
+    for own in found:
+        with atomic_write(tmp_path / f"{own}.step") as file:
+            file.write("")
 
 
 def test_numpy_becomes_plain_and_the_order_of_keys_is_kept(tmp_path):

@@ -73,18 +73,21 @@ def test_design_studies_check_their_curves_before_they_optimise(tmp_path, monkey
     assert not list(tmp_path.iterdir())
 
 
-def test_curves_that_share_files_or_no_axes_make_no_report(tmp_path):
+def test_curves_of_one_configuration_or_of_no_common_axes_make_no_report_and_names_no_other_folder(tmp_path):
     simulation, motor, _ = driven_toggle()
     scene = simulation.scene
     push = scene.mechanism.forces[0]
-    up, also_up = (scene.configuration(name, {motor: 0.5}) for name in ("half up", "half-up"))
+    up, also_up = (scene.configuration(name, {motor: 0.5}) for name in ("half up", "../half-up"))
     curves = [simulation.load_displacement(push, forces=[0.0], configuration=place) for place in (up, also_up)]
     moved = simulation.follow(motor, until=fm.Until(position=-0.5))
     with pytest.raises(fm.DescriptionError, match="'half up', by which their files are named"):
-        fm.write_report(tmp_path, simulation, curves)
+        fm.write_report(tmp_path, simulation, [curves[0], curves[0]])
     with pytest.raises(fm.DescriptionError, match="no axes in common"):
         fm.write_report(tmp_path, simulation, [curves[0], moved])
     assert not list(tmp_path.iterdir())
+    fm.write_report(tmp_path / "report", simulation, curves)
+    assert {path.name for path in tmp_path.rglob("*.csv")} == {"curve-half-up.csv", "curve-half-up-2.csv"}
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
 
 
 def test_curve_of_a_motor_is_reported_without_estimates(tmp_path):

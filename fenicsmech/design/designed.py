@@ -16,7 +16,7 @@ from fenicsmech.design.numbers import Number
 from fenicsmech.design.objective import Group, Objective, sample_numbers, split
 from fenicsmech.design.regularisers import Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
-from fenicsmech.design.result import DesignResult, shapes_of, solid_path
+from fenicsmech.design.result import DesignResult, shapes_of
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import LinkShape, shape_links
 from fenicsmech.design.target import Comparison, Target, check_targets
@@ -68,11 +68,6 @@ class DesignedSimulation:
         self.shapes = with_followers([own for own in self.designs if isinstance(own, SplineDesign)], self.numbers)
         solids = [link for number in self.numbers for link in number.kind.reshaped]
         self.changed = tuple(dict.fromkeys([*(link for own in self.shapes for link in own.links), *solids]))
-        files = [solid_path("", link, "").name for link in self.changed]
-        if twice := [own.name for own, file in zip(self.changed, files, strict=True) if files.count(file) > 1]:
-            raise DescriptionError(
-                "design problem", f"files of {' and '.join(map(repr, twice))} have one name", "Rename one of the links"
-            )
         self._requests = shape_requests(self.shapes, simulation, self.numbers)
         self._like: DesignedSimulation | None = None
         self._narrower: DesignedSimulation | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from fenicsmech.design.shape.shape_map import gather_links
 from fenicsmech.design.target import Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
-from fenicsmech.files import atomic_write, read_json, write_json
+from fenicsmech.files import atomic_write, file_names, read_json, write_json
 from fenicsmech.mechanism import Disc, FlexibleLink, Material, Scene, Units
 from fenicsmech.meshing import Isometry, LinkMesh, boundary_polygons, section_of
 from fenicsmech.model import Design
@@ -471,11 +471,12 @@ def write_solids(
     hole: float | None,
 ) -> None:
     """Local. Writes ``NAME.step`` and ``NAME.stl`` of every link, with holes of this diameter for pins if given."""
+    files = solid_files(links)
     for link, mesh, depth in zip(links, meshes, depths, strict=True):
         regions = [linkage.bodies[i] for i in linkage.interfaces[link]]
         pins = [PinHole((b.centre[0], b.centre[1]), hole) for b in regions if hole and isinstance(b.region, Disc)]
         for suffix, write in ((".step", write_step), (".stl", write_stl)):
-            write(solid_path(folder, link, suffix), mesh, depth=depth, pins=pins, name=link.name)
+            write(Path(folder) / f"{files[link]}{suffix}", mesh, depth=depth, pins=pins, name=link.name)
 
 
 def write_parts(
@@ -492,15 +493,16 @@ def write_parts(
         folder: where to.
         shapes: the links that have each shape.
         materials: of the links, as the design has them.
-        depths: likewise.
+        depths: likewise, of all links that are written.
     """
+    files = solid_files(depths)
     parts: dict[tuple, list[FlexibleLink]] = {}
     for number, links in enumerate(shapes):
         for link in links:
             parts.setdefault((number, materials[link], depths[link]), []).append(link)
     listed = [
         {
-            "file": solid_path("", links[0], ".step").name,
+            "file": f"{files[links[0]]}.step",
             "count": len(links),
             "links": [link.name for link in links],
             "material": material.name,
@@ -512,6 +514,7 @@ def write_parts(
     write_json(Path(folder) / "parts.json", {"parts": listed})
 
 
-def solid_path(folder: str | Path, link: FlexibleLink, suffix: str) -> Path:
-    """The file of an exported link."""
-    return Path(folder) / f"{link.name.replace(' ', '-')}{suffix}"
+def solid_files(links: Iterable[FlexibleLink]) -> dict[FlexibleLink, str]:
+    """Names of the files of exported links, without their endings."""
+    links = list(links)
+    return dict(zip(links, file_names(link.name for link in links), strict=True))

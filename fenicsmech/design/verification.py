@@ -22,7 +22,7 @@ import numpy as np
 from fenicsmech.collective import on_one
 from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.optimisers.problem import Infeasible
-from fenicsmech.design.result import DesignResult, PartValue, component_values, solid_path
+from fenicsmech.design.result import DesignResult, PartValue, component_values, solid_files
 from fenicsmech.design.target import Comparison, Target
 from fenicsmech.design.transfer import WholeState
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
@@ -73,8 +73,10 @@ def part_simulations(
                     "Describe the part in a scene of its own, with fm.step_file(…) and a predicate of its points",
                 )
     on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
-    files = zip(links, depths, strict=True)
-    shapes = {link: step_file(solid_path(folder, link, ".step"), depth=depth) for link, depth in files}
+    files = solid_files(links)
+    shapes = {
+        link: step_file(folder / f"{files[link]}.step", depth=depth) for link, depth in zip(links, depths, strict=True)
+    }
     halved = _halved(simulation, targets)
     coarse, fine = (
         simulation.with_shapes(shapes, fidelity=_finer(simulation, factor, halved), moved=moved, placed=placed)
@@ -98,8 +100,9 @@ def placed_points(
 
 
 def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
+    files = solid_files(links)
     for link, mesh, depth in zip(links, meshes, depths, strict=True):
-        write_step(solid_path(folder, link, ".step"), mesh, depth=depth, name=link.name)
+        write_step(folder / f"{files[link]}.step", mesh, depth=depth, name=link.name)
 
 
 def _halved(simulation: Simulation, targets: Sequence[Target]) -> bool:

@@ -7,7 +7,7 @@
 - ``session``: project, history, and what a gesture leads to
 - ``server``: static files and a WebSocket on 127.0.0.1; ``solver``: the process that computes, ended at any time
 - ``responses``: linear ones of what the page draws; ``grip``: a point that the pointer holds
-- ``cancel``: equilibria that a new gesture ends at their next iteration; ``told``: problems with their remedies
+- ``cancel``: equilibria that a new gesture ends at their next iteration; ``problems``, with their remedies
 - ``solid``: the process that solves in space; ``job``: runs it
 - ``build``: the simulation and the design problem of a project; ``script``: the Python script that does the same
 - ``stored``: first results for the next start, shown before the solver is up
@@ -29,6 +29,8 @@ from fenicsmech.live.job import Job
 from fenicsmech.live.messages import LARGEST, PER_SECOND, read_message
 from fenicsmech.live.project import (
     FORMAT,
+    LARGEST_PROJECT,
+    MOST_ELEMENTS,
     Project,
     edited,
     example,
@@ -49,7 +51,7 @@ def live(
     problem: DesignProblem | Project,
     *,
     result: DesignResult | None = None,
-    port: int = 0,
+    port: int | None = None,
     browse: bool = True,
     options: ServerOptions | None = None,
 ) -> None:
@@ -61,18 +63,21 @@ def live(
     Args:
         problem: with a force in the sample of one target at least; or a project of the page.
         result: of the problem, whose shape is opened; the drawn one by default.
-        port: of 127.0.0.1; a free one by default.
+        port: of 127.0.0.1; a free one by default. Where ``options`` are given, the port is theirs.
         browse: whether a browser is opened; otherwise the address is printed alone.
-        options: of the server, such as its limits of time, with its port.
+        options: of the server, such as its limits of time and its port.
 
     Raises:
         DescriptionError: a part of the problem has no plain data, as a function of the script's own, the result belongs
-            to another problem or a project is given with one, or aiohttp is missing.
+            to another problem or a project is given with one, a port is given twice, or aiohttp is missing.
     """
+    if options is not None and port is not None:
+        remedy = f"Give it once: options=fm.ServerOptions(port={port}, …)"
+        raise DescriptionError("live page", "a port is given beside the options, which have one", remedy)
     if isinstance(problem, DesignProblem):
         project = project_of(problem, result)
     elif result is not None:
         raise DescriptionError("live page", "a result is given with a project", "Give the problem of the result")
     else:
         project = problem
-    serve(project, options=options or ServerOptions(port=port), browse=browse)
+    serve(project, options=options or ServerOptions(port=port or 0), browse=browse)

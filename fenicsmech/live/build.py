@@ -22,7 +22,18 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import JOINT_KINDS
 from fenicsmech.laws import NeoHookean
 from fenicsmech.live.carried import made
-from fenicsmech.live.project import PAPER_NAMES, Project, forces_of, materials, sampled
+from fenicsmech.live.project import (
+    MOST_ELEMENTS,
+    PAPER_NAMES,
+    Project,
+    elements,
+    elements_drawn,
+    forces_of,
+    materials,
+    sampled,
+    sized,
+    too_many,
+)
 from fenicsmech.mechanism import (
     DRAWN,
     ONYX,
@@ -37,18 +48,21 @@ from fenicsmech.mechanism import (
     Link,
     Material,
     Mechanism,
+    MeshPart,
     Motor,
     Output,
     Rectangle,
     Region,
     Scene,
     Shape,
+    StepPart,
     gmsh_mesh,
     material,
     polygon,
     step_file,
     strip,
 )
+from fenicsmech.meshing import plan_size
 from fenicsmech.quantities import Displacement, ForceMagnitude, JointPosition, MotorOffset, NumberKind, Sample, at
 from fenicsmech.simulation import CurveRequest, Simulation, read_request
 
@@ -200,6 +214,8 @@ def draw(project: Project, method: EquilibriumMethod | None = None) -> Drawing:
         else:
             shape = _shape(own["shape"], folder and folder / f"{k}")
             links[own["name"]] = mechanism.flexible(own["name"], shape, material_of(own["material"]))
+    if filed:
+        _check_size(project, links)
     joints = {own["name"]: _join(mechanism, links, own) for own in project["joints"]}
     motors = {own["name"]: mechanism.motor(joints[own["joint"]], name=own["name"]) for own in project["motors"]}
     parts: dict[str, Mapping[str, Any]] = {"links": links, "joints": joints, "motors": motors}
@@ -217,6 +233,19 @@ def draw(project: Project, method: EquilibriumMethod | None = None) -> Drawing:
     if folder is not None:  # it is read when links are meshed
         finalize(drawing, rmtree, folder, ignore_errors=True)
     return drawing
+
+
+def _check_size(project: Project, links: Mapping[str, Link]) -> None:
+    """Refuses too many elements of links from files, before these are meshed."""
+    count = elements_drawn(project)
+    for own, size in sized(project):
+        link = links[own["name"]]
+        if isinstance(link, FlexibleLink) and isinstance(link.shape, StepPart | MeshPart):
+            area, given = plan_size(link.shape, f"link {link.name!r}")
+            count += elements(area, size) + given
+    if count > MOST_ELEMENTS:
+        remedy = "Choose larger elements, or give files with fewer"
+        raise DescriptionError("elements of links from files", too_many(project, count), remedy)
 
 
 def placement(project: Project, problem: DesignProblem | None) -> HandlePlacement | None:

@@ -48,6 +48,7 @@ from fenicsmech.model import fits
 from fenicsmech.quantities import ForceMagnitude, Sample
 from fenicsmech.simulation import Simulation
 
+_SMALLER = "Choose larger elements, or give files with fewer faces or elements"
 _REMEDY = "Describe it with what the live page knows: python3 -m fenicsmech.live shows a project"
 
 
@@ -67,7 +68,8 @@ def project_of(problem: DesignProblem, result: DesignResult | None = None) -> Pr
     try:
         project = read_project(_data(problem))
     except Refused as refused:
-        raise DescriptionError(part, str(refused), _REMEDY) from None
+        remedy = _SMALLER if refused.place in ("", "simulation.size") else _REMEDY
+        raise DescriptionError(part, str(refused), remedy) from None
     except DescriptionError as error:
         raise DescriptionError(part, error.problem, error.remedy) from None
     if result is None:

@@ -21,10 +21,9 @@ import numpy as np
 from fenicsmech.design import SplineDesign, rest_meshes
 from fenicsmech.errors import DescriptionError, FenicsmechError
 from fenicsmech.export import smooth_outline
-from fenicsmech.files import atomic_write
+from fenicsmech.files import atomic_write, file_names
 from fenicsmech.live.build import Drawing, draw, placement
 from fenicsmech.live.project import Project, forces_of
-from fenicsmech.mechanism import FlexibleLink
 from fenicsmech.meshing import CircleArc, boundary_polygons
 from fenicsmech.plot import Panel, draw_configurations
 from fenicsmech.simulation import Curve, MechanismPlotter, Simulation, gather
@@ -73,12 +72,14 @@ def _links(project: Project, drawing: Drawing, what: str, folder: Path) -> list[
     model = drawing.simulation.model
     with model.shaped(problem.rest_shape(at)):
         meshes = rest_meshes(drawing.simulation, links)
+    names = file_names(link.name for link in links)
     return [
-        _write_dxf(folder, link, boundary_polygons(link.name, mesh)) for link, mesh in zip(links, meshes, strict=True)
+        _write_dxf(folder / f"{name}.dxf", boundary_polygons(link.name, mesh))
+        for link, name, mesh in zip(links, names, meshes, strict=True)
     ]
 
 
-def _write_dxf(folder: Path, link: FlexibleLink, polygons: Sequence[np.ndarray]) -> Path:
+def _write_dxf(path: Path, polygons: Sequence[np.ndarray]) -> Path:
     """The outline of a link and its holes as closed polylines of DXF R12, in mm, points of its smooth curves."""
     lines = ["0", "SECTION", "2", "ENTITIES"]
     for polygon in polygons:
@@ -87,7 +88,6 @@ def _write_dxf(folder: Path, link: FlexibleLink, polygons: Sequence[np.ndarray])
             for x, y in _sampled(curve):
                 lines += ["0", "VERTEX", "8", "0", "10", f"{x:.6f}", "20", f"{y:.6f}"]
         lines += ["0", "SEQEND"]
-    path = folder / f"{link.name.replace(' ', '-')}.dxf"
     with atomic_write(path) as file:
         file.write("\n".join([*lines, "0", "ENDSEC", "0", "EOF", ""]))
     return path

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
-from fenicsmech.live.told import too_long
+from fenicsmech.live.problems import too_long
 
 _LONGEST = 2**27  # bytes of an event
 
@@ -57,7 +57,7 @@ class Job:
             return await self._end()
 
     async def forget(self) -> None:
-        """Ends the task at work, and forgets what it has told: its subject is another one."""
+        """Ends the task at work, and forgets its last event: its subject is another one."""
         async with self._changing:
             ended, self.last = await self._end(), None
         if ended:

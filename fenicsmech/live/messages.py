@@ -14,7 +14,7 @@ Page to server, one WebSocket message each, at most ``LARGEST`` bytes. ``kind`` 
              at, by         optional: what the pointer holds, {link, place: [x, y] under the curve's force}, and the
                             force by [x, y] that it exerts there beside that of the curve
     release             the pointer exerts none; the solver goes on with what the push had interrupted
-    fit                 the design follows its targets once
+    fit                 the design follows its targets once, a step of the history
     stop                ends what the solver does
     solve solid  curve  solves a curve in space, in a process of its own beside the solver
     stop solid          ends that
@@ -22,10 +22,11 @@ Page to server, one WebSocket message each, at most ``LARGEST`` bytes. ``kind`` 
 Server to page, each with ``heard``, how many messages of the page came before: an event that is older than the page's
 last edit knows nothing of it. ``event`` is one of
 
-    project     project, undo and redo (whether there are steps), opened (how many projects were), examples, materials,
-                    constants: {material: {E, nu, density}}, most: {curves, targets}
-    first       curves of the project as it was opened: [{force, positions, others, points: [[displacement, force]]}]
-    solver      state: starting, ready, busy, idle, restarted or failed; since: seconds
+    project     project, undo and redo (whether there are steps), opened (which of those opened it is made of),
+                    examples, materials, constants: {material: {E, nu, density}}, most: {curves, targets, bytes}
+    first       curves of the project as it was opened: [{force, positions, others, held, ratios, largest,
+                    points: [[displacement, force]]}]
+    solver      state: starting, busy, idle or failed, of task; seconds that it took, where it is done
     refused     place, problem: of the last message, which changed nothing
     solid       state: solving (done, of: frames), failed (part, problem, remedy), cancelled, or solved with
                     curve, project (of the solid), remarks, failed, seconds, errors (of displacements; null if failed),
@@ -35,13 +36,17 @@ last edit knows nothing of it. ``event`` is one of
                         rigid [[[x, y]] a rigid link]
     and the results of the solver below, of the present task alone
 
-Server to solver, a line each: {task: number, kind: solve | push, project, fit, curve, force, at, by, longest
-(seconds that it may take)}.
+Server to solver, a line each, {task: number, kind} with
+
+    solve     project, fit, longest (seconds that it may take)
+    push      project, curve, force, at, by, longest
+    nothing   ends the task at work
 
 Solver to server, a line each, with the number of their task:
 
-    ready, began
-    mesh      flexible: [{name, triangles, loops}], rigid: [{name, fixed, width}], welded: [bool]
+    ready     alone has no number
+    began
+    mesh      width (of the drawing), flexible: [{name, triangles, loops}], rigid: [{name, fixed}], welded: [bool]
     iterate   number, design, values (corrected, of all targets), misfits (relative, of all targets)
     curve     curve, iterate (null of the final one), remarks, failed, and points, one a frame:
                   force, displacement, stable, snapped, stress (largest von Mises),
@@ -79,11 +84,23 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from fenicsmech.live.project import MOST_CURVES
-from fenicsmech.live.schema import FLAG, Anything, ByKind, Choice, Many, Number, Record, Refused, Schema, Text
+from fenicsmech.live.project import LARGEST_PROJECT, MOST_CURVES
+from fenicsmech.live.schema import (
+    FLAG,
+    LONGEST_NAME,
+    Anything,
+    ByKind,
+    Choice,
+    Many,
+    Number,
+    Record,
+    Refused,
+    Schema,
+    Text,
+)
 
-LARGEST = 1_000_000
-"""Bytes of a message from the page."""
+LARGEST = 2 * LARGEST_PROJECT
+"""Bytes of a message from the page: a project with its design, and numbers as JavaScript writes them."""
 
 PER_SECOND = 120
 """Messages of a page in a second, above the rate of its screen; more are refused."""
@@ -93,7 +110,7 @@ class _Step(Schema):
     """A key or an index."""
 
     def check(self, value, place=""):
-        (Text(40) if isinstance(value, str) else Number(0, 10_000, whole=True)).check(value, place)
+        (Text(LONGEST_NAME) if isinstance(value, str) else Number(0, 10_000, whole=True)).check(value, place)
 
 
 _PATH = Many(_Step(), 1, 8)
@@ -120,7 +137,7 @@ PAGE = ByKind(
         "example": Record({"name": Text(60)}),
         "push": Record(
             {"curve": _CURVE, "force": _FORCE},
-            {"at": Record({"link": Text(60), "place": _PLACE}), "by": Many(_FORCE, 2, 2)},
+            {"at": Record({"link": Text(LONGEST_NAME), "place": _PLACE}), "by": Many(_FORCE, 2, 2)},
         ),
         "release": Record({}),
         "fit": Record({}),

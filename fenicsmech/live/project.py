@@ -54,6 +54,7 @@ MOST_TARGETS = 40
 MOST_ADDED = {"curves": 4, "targets": 12}  # up to which the page adds; scripts bring more
 MOST_ELEMENTS = 10_000  # triangles of a mesh, which the page draws in each of up to 160 frames
 LARGEST_FILE = 600_000  # characters of the content of a link's file
+LARGEST_PROJECT = 2_000_000  # bytes of all but the design, as JSON without spaces
 MOST_PARAMETERS = MOST_LINKS * 100 * 2  # of a design: two coordinates of each handle
 
 _COORDINATE = Number(-1e5, 1e5)
@@ -239,6 +240,7 @@ def read_project(data: Any) -> Project:
         Refused: it is none.
     """
     PROJECT.check(data)
+    _check_length(data)
     project = deepcopy(data)
     links, joints = _named(project, "links"), _named(project, "joints")
     motors, forces = _named(project, "motors"), _named(project, "forces")
@@ -300,15 +302,42 @@ def read_project(data: Any) -> Project:
     return project
 
 
+def _check_length(project: Project) -> None:
+    """Refuses more than the page saves and opens again."""
+    drawn = {key: own for key, own in project.items() if key != "design"}
+    length = len(json.dumps(drawn, ensure_ascii=False, separators=(",", ":")).encode())
+    if length > LARGEST_PROJECT:
+        raise Refused("", f"a project of {length / 1e6:.3g} MB, not at most {LARGEST_PROJECT / 1e6:g} MB")
+
+
 def _check_size(project: Project) -> None:
-    """Refuses elements so small that there are too many: triangles of side h cover 0.43 h² each."""
-    size, shapes = (
-        project["simulation"]["size"],
-        [own["shape"] for own in project["links"] if own["kind"] == "flexible"],
-    )
-    count = sum(_area(shape, size) for shape in shapes if "content" not in shape) / (0.43 * size**2)
+    """Refuses elements so small that there are too many."""
+    count = elements_drawn(project)
     if count > MOST_ELEMENTS:
-        raise Refused("simulation.size", f"some {count:.2g} elements of {size:g} mm, not at most {MOST_ELEMENTS}")
+        raise Refused("simulation.size", too_many(project, count))
+
+
+def elements_drawn(project: Project) -> float:
+    """How many elements the flexible links have, without those from files."""
+    return sum(
+        elements(_area(own["shape"], size), size) for own, size in sized(project) if "content" not in own["shape"]
+    )
+
+
+def too_many(project: Project, count: float) -> str:
+    """What is wrong with so many elements."""
+    return f"some {count:.2g} elements of {project['simulation']['size']:g} mm, not at most {MOST_ELEMENTS}"
+
+
+def sized(project: Project) -> list[tuple[dict[str, Any], float]]:
+    """The flexible links, and the size of elements of each."""
+    size, ratios = project["simulation"]["size"], project["simulation"].get("sizes", {})
+    return [(own, size * ratios.get(own["name"], 1.0)) for own in project["links"] if own["kind"] == "flexible"]
+
+
+def elements(area: float, size: float) -> float:
+    """How many elements of a size an area has: equilateral triangles cover 0.43 of its square each."""
+    return area / (0.43 * size**2)
 
 
 def _area(shape: Mapping[str, Any], size: float) -> float:

@@ -27,12 +27,12 @@ from fenicsmech.errors import DescriptionError
 from fenicsmech.live.build import constants
 from fenicsmech.live.job import Job, events
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
-from fenicsmech.live.project import MOST_ADDED, Project, example_names, materials
+from fenicsmech.live.problems import too_long
+from fenicsmech.live.project import LARGEST_PROJECT, MOST_ADDED, Project, example_names, materials
 from fenicsmech.live.schema import Refused
 from fenicsmech.live.script import script
 from fenicsmech.live.session import Session
 from fenicsmech.live.stored import StoredResults, user_cache
-from fenicsmech.live.told import too_long
 from fenicsmech.log import logger
 
 if TYPE_CHECKING:
@@ -77,12 +77,12 @@ class ServerOptions:
 
     Attributes:
         port: on 127.0.0.1; 0 for a free one.
-        restarts: of the solver process within ``within`` seconds; more are a failure that is told.
+        restarts: of the solver process within ``within`` seconds; more are a failure that pages show.
         within: seconds.
         patience: seconds after which a solver that does not leave its task for the next one is started again; compiling
             new forms, which nothing ends, takes up to a minute.
         longest_solve: seconds that the solver may take for a task, with the optimisation; then it ends at its next
-            factor, tells so and keeps what it has found. One that does not end within ``patience`` is started again.
+            factor, says so and keeps what it has found. One that does not end within ``patience`` is started again.
         longest_solid: seconds that a solve in space may take.
         longest_export: seconds that the files of an export may take.
         door: seconds for which the address that opens the browser works.
@@ -129,7 +129,9 @@ class Server:
         self._opened = None if self.session.task["fit"] else self.session.project  # whose results may be stored
         self._state: dict[str, Any] = {"event": "solver", "state": "starting"}
         self._drawn: Mapping[str, Any] | None = None  # the last final curve
-        self._first: dict[int, dict[str, Any]] = {}  # curves of the project as it was opened
+        self._firsts: dict[int, dict[int, dict[str, Any]]] = {}  # curves of each project as it was opened
+        self._pushing: Outbox | None = None  # the page of the last push
+        self._editing: Outbox | None = None  # the page of the last edit that was not settled
         self._runner: Any = None
         self._exporting = asyncio.Semaphore(1)
 
@@ -184,7 +186,7 @@ class Server:
         origin = request.headers.get("Origin")
         foreign = request.headers.get("Host") not in names
         foreign = foreign or (origin is not None and origin.removeprefix("http://") not in names)
-        given = request.path.split("/")[1]
+        given = request.path.partition("/")[2].partition("/")[0]  # a path may be *
         known = given == "open" or secrets.compare_digest(given.encode(), self.token.encode())
         if foreign or not known:
             raise _aiohttp().web.HTTPForbidden(text="This page is not for you.")
@@ -221,15 +223,27 @@ class Server:
                     if len(recent) == PER_SECOND and now - recent[0] < 1.0:
                         raise Refused("", f"more than {PER_SECOND} messages a second")
                     recent.append(now)
-                    await self._from_page(read_message(message.data))
+                    await self._from_page(read_message(message.data), outbox)
                 except Refused as refused:
-                    told = {"event": "refused", "place": refused.place, "problem": refused.problem}
-                    for event in (self._state, self._project_event(), told):  # it may show what was refused
+                    why = {"event": "refused", "place": refused.place, "problem": refused.problem}
+                    for event in (self._state, self._project_event(), why):  # it may show what was refused
                         outbox.put(json.dumps(event))
         finally:
             self._pages.discard(outbox)
             outbox.end()
+            await self._end_gestures(outbox)
         return page
+
+    async def _end_gestures(self, page: Outbox) -> None:
+        """Releases what a page that is gone pushes, and settles what it edits."""
+        if self._editing is page:
+            self._editing = None
+            if self.session.settle():
+                self._tell(self._project_event())
+        if self._pushing is page:
+            self._pushing = None
+            if self._pushed:
+                await self._from_page({"kind": "release"}, page)
 
     async def _export(self, request: web.Request) -> web.StreamResponse:
         web, what = _aiohttp().web, request.match_info["what"]
@@ -246,11 +260,11 @@ class Server:
         else:
             async with self._exporting:
                 head, _, data = (await self._exported(project, what)).partition(b"\n")
-            told = json.loads(head or b'{"problem": "The files could not be made."}')
-            if "problem" in told:
-                self._tell({"event": "refused", "place": f"export of {what}", "problem": told["problem"]})
-                raise web.HTTPConflict(text=told["problem"])
-            name = told["name"] if told["name"] != "files.zip" else f"{stem}-{what}.zip"
+            made = json.loads(head or b'{"problem": "The files could not be made."}')
+            if "problem" in made:
+                self._tell({"event": "refused", "place": f"export of {what}", "problem": made["problem"]})
+                raise web.HTTPConflict(text=made["problem"])
+            name = made["name"] if made["name"] != "files.zip" else f"{stem}-{what}.zip"
         headers = {"Content-Disposition": f'attachment; filename="{re.sub(r"[^A-Za-z0-9.-]+", "-", name)}"'}
         return web.Response(body=data, content_type="application/octet-stream", headers=headers)
 
@@ -269,7 +283,7 @@ class Server:
                 process.kill()
                 await process.wait()
 
-    async def _from_page(self, message: Mapping[str, Any]) -> None:
+    async def _from_page(self, message: Mapping[str, Any], page: Outbox) -> None:
         if message["kind"] == "solve solid":
             self.session.check_curve(message["curve"])
             await self._solid.start({"project": self.session.project, "curve": message["curve"]})
@@ -282,14 +296,20 @@ class Server:
             return
         opened = self.session.opened
         answer = self.session.answer(message)
+        if message["kind"] == "push":
+            self._pushing = page
+        elif message["kind"] == "edit":
+            self._editing = None if message["settled"] else page
         if answer.stop or answer.task is not None:
             self._number += 1  # before anything is awaited: results of earlier tasks are not of this project
         if answer.changed:
             self._tell(self._project_event())
         if opened != self.session.opened:
-            self._first = {}
+            self._kept.clear()
+            self._drawn = None
             self._tell(self._first_event())
         if answer.stop:
+            self._pushed = False
             self._say("idle")
             await self._solver.interrupt(self._number)
         elif answer.task is not None:
@@ -307,7 +327,7 @@ class Server:
         await self._solver.ask({**task, "task": self._number, "longest": self._options.longest_solve})
 
     def _from_solver(self, event: dict[str, Any]) -> None:
-        if event["event"] in ("ready", "restarted", "lost"):
+        if event["event"] in ("ready", "lost"):
             if event["event"] == "lost":
                 self._say("failed")
             return
@@ -336,12 +356,16 @@ class Server:
         if event["event"] != "errors" or self._drawn is None or self._drawn["curve"] != event["curve"]:
             return
         number, project = event["curve"], self.session.project
-        if number not in self._first and self.session.untouched:
+        first = self._firsts.setdefault(self.session.opened, {})
+        if number not in first and self.session.untouched:
             own = project["curves"][number]
-            self._first[number] = {
+            first[number] = {
                 "force": next(force for force in project["forces"] if force["name"] == own["force"]),
                 "positions": own["positions"],
                 "others": own["others"],
+                "held": own.get("held", False),
+                "ratios": own.get("ratios"),
+                "largest": own["largest"],
                 "points": [
                     [point["displacement"], point["force"] + error]
                     if own.get("held")
@@ -374,12 +398,12 @@ class Server:
             "opened": self.session.opened,
             "examples": example_names(),
             "materials": materials(),
-            "most": MOST_ADDED,
+            "most": {**MOST_ADDED, "bytes": LARGEST_PROJECT},
             "constants": constants(),
         }
 
     def _first_event(self) -> dict[str, Any]:
-        return {"event": "first", "curves": list(self._first.values())}
+        return {"event": "first", "curves": list(self._firsts.get(self.session.opened, {}).values())}
 
     def _tell(self, event: Mapping[str, Any]) -> None:
         self._send(json.dumps(event))
@@ -476,23 +500,37 @@ class SolverProcess:
         )
         self._reader = asyncio.create_task(self._read(self._process))
 
+    async def _start_again(self) -> bool:
+        """Starts it where another one was; whether that was possible."""
+        try:
+            await self._start()
+        except OSError as error:  # the machine has no memory or no processes left
+            _log.warning("the solver process cannot be started: %s", error)
+            self._process = None
+            self._receive({"event": "lost"})
+            return False
+        return True
+
     async def ask(self, task: Mapping[str, Any]) -> None:
         """Gives it a task, which cancels the one before."""
         self._last = task
         async with self._starting:
             if self._process is None and not self._stopped:  # it was lost; another task may do
                 self._ends.clear()
-                await self._start()
+                await self._start_again()
         if task is not self._last:
             return  # a later one has come
+        await self._give(task)
+
+    async def _give(self, task: Mapping[str, Any]) -> None:
         await self._write(task)
-        if self._waiting is None and not self._stopped:
+        if self._waiting is None and self._process is not None:
             self._wait()
 
     async def interrupt(self, number: int) -> None:
-        """Ends the task at work."""
-        self._last = None
-        await self._write({"task": number, "kind": "nothing"})
+        """Ends the task at work; a process that does not leave it in time is started again."""
+        self._last = {"task": number, "kind": "nothing"}
+        await self._give(self._last)
 
     async def stop(self) -> None:
         """Ends the process."""
@@ -566,7 +604,7 @@ class SolverProcess:
                     self._rest()
                 self._receive(event)
         except Exception:  # nobody waits for this: it would end silently
-            _log.exception("the solver process says what nobody understands")
+            _log.exception("an event of the solver process is not as it should be")
             with suppress(ProcessLookupError):
                 process.kill()
         await process.wait()
@@ -579,9 +617,9 @@ class SolverProcess:
             self._receive({"event": "lost"})
             return
         self._ends.append(now)
-        await self.start()
-        self._receive({"event": "restarted"})
-        if self._last is not None:
+        async with self._starting:
+            again = await self._start_again()
+        if again and self._last is not None:
             await self._write(self._last)
 
 

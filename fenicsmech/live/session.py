@@ -27,6 +27,14 @@ class Answer:
     stop: bool = False
 
 
+@dataclass(frozen=True)
+class _Opened:
+    """A project as it was opened, and how many were before."""
+
+    project: Project
+    number: int
+
+
 class Session:
     """The project of a page.
 
@@ -37,17 +45,22 @@ class Session:
         project: the present one.
         task: what the solver was asked for last, but for pushes, without its number.
         solved: whether that is done.
-        opened: how many projects were.
     """
 
     def __init__(self, project: Project) -> None:
-        self.project = self._opened = read_project(project)
-        self._past: list[Project] = []
-        self._future: list[Project] = []
+        self.project = read_project(project)
+        self._opened, self._count = _Opened(self.project, 1), 1
+        self._past: list[tuple[Project, _Opened]] = []
+        self._future: list[tuple[Project, _Opened]] = []
         self._before: Project | None = None  # of a gesture that lasts
         self._interrupted = False  # whether that gesture has interrupted a fit
-        self.solved, self._stopped, self.opened = False, False, 1
+        self.solved, self._stopped = False, False
         self.task: Mapping[str, Any] = self._solve(fit=project["fit"] and project["design"] is None)
+
+    @property
+    def opened(self) -> int:
+        """Which of the projects that were opened the present one is made of, from 1."""
+        return self._opened.number
 
     @property
     def can_undo(self) -> bool:
@@ -63,7 +76,7 @@ class Session:
     def untouched(self) -> bool:
         """Whether the project is as it was opened, but for what the solver has found."""
         design = {"design": None}
-        return {**self.project, **design} == {**self._opened, **design}
+        return {**self.project, **design} == {**self._opened.project, **design}
 
     def answer(self, message: Mapping[str, Any]) -> Answer:
         """Applies a message that ``messages.read_message`` has checked.
@@ -81,7 +94,7 @@ class Session:
             case "redo":
                 return self._redo()
             case "reset":
-                return self._replace(self._opened, opened=False)
+                return self._replace(self._opened.project, opened=False)
             case "open":
                 return self._replace(read_project(message["project"]), opened=True)
             case "example":
@@ -93,10 +106,23 @@ class Session:
             case "release":
                 return Answer() if self.solved else Answer(task=self.task)
             case "fit":
-                return self._asked(self._solve(fit=True), changed=False)
+                return self._fit()
             case _:
                 self._stopped = True
                 return Answer(stop=True)
+
+    def settle(self) -> bool:
+        """Ends a gesture where it rests, for a page that does not; whether there was one."""
+        if self._before is None:
+            return False
+        self._step(self._before)
+        return True
+
+    def _fit(self) -> Answer:
+        task = self._solve(fit=True)
+        if task["fit"]:
+            self._step(self._before or self.project)
+        return self._asked(task)
 
     def _push(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         self.check_curve(message["curve"])
@@ -134,7 +160,8 @@ class Session:
         return self._asked(task)
 
     def _step(self, before: Project) -> None:
-        self._past, self._future, self._before = [*self._past[1 - _STEPS :], before], [], None
+        self._past = [*self._past[1 - _STEPS :], (before, self._opened)]
+        self._future, self._before = [], None
 
     def _cancel(self) -> Answer:
         if self._before is None:
@@ -145,24 +172,24 @@ class Session:
     def _undo(self) -> Answer:
         if not self.can_undo:
             raise Refused("", "there is nothing to undo")
-        self._future.append(self.project)
-        self.project = self._before or self._past.pop()
+        self._future.append((self.project, self._opened))
+        self.project, self._opened = (self._before, self._opened) if self._before else self._past.pop()
         self._before = None
         return self._asked(self._solve(fit=False))
 
     def _redo(self) -> Answer:
         if not self._future:
             raise Refused("", "there is nothing to redo")
-        self._past.append(self._before or self.project)
-        self.project, self._before = self._future.pop(), None
+        self._past.append((self._before or self.project, self._opened))
+        (self.project, self._opened), self._before = self._future.pop(), None
         return self._asked(self._solve(fit=False))
 
     def _replace(self, project: Project, *, opened: bool) -> Answer:
         self._step(self._before or self.project)
         self.project = project
         if opened:
-            self._opened = project
-            self.opened += 1
+            self._count += 1
+            self._opened = _Opened(project, self._count)
         return self._asked(self._solve(fit=project["fit"] and project["design"] is None))
 
     def _solve(self, *, fit: bool) -> Mapping[str, Any]:

@@ -17,8 +17,8 @@ import numpy as np
 
 from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechError
 from fenicsmech.live.build import draw, placement
+from fenicsmech.live.problems import explained, remarks
 from fenicsmech.live.project import Project, forces_of
-from fenicsmech.live.told import remarks, told
 from fenicsmech.simulation import Frame, MechanismPlotter, Simulation, gather, outer_surface
 from fenicsmech.stress import von_mises
 
@@ -67,14 +67,14 @@ def solve_solid(project: Project, number: int, emit: Callable[[dict[str, Any]], 
                 "curve": number,
                 "project": project,
                 "remarks": [] if curve is None else remarks(curve),
-                "failed": failure and told(failure),
+                "failed": failure and explained(failure),
                 "errors": errors,
                 "seconds": round(perf_counter() - began, 2),
                 **(_surface(simulation, frames) if frames else {"triangles": "", "points": []}),
             }
         )
     except FenicsmechError as error:
-        emit({"event": "solid", "state": "failed", **told(error)})
+        emit({"event": "solid", "state": "failed", **explained(error)})
 
 
 def _check_size(simulation: Simulation, frames: int) -> None:

@@ -25,6 +25,7 @@ from fenicsmech.errors import DescriptionError, EquilibriumError, FenicsmechErro
 from fenicsmech.live.build import Drawing, draw, placement
 from fenicsmech.live.cancel import Cancellable, Cancelled, TooLong
 from fenicsmech.live.grip import Grip
+from fenicsmech.live.problems import explained, missed, remarks, too_long
 from fenicsmech.live.project import Project, drawing, forces_of
 from fenicsmech.live.responses import (
     LoadChange,
@@ -37,7 +38,6 @@ from fenicsmech.live.responses import (
     shifted,
     turned,
 )
-from fenicsmech.live.told import missed, remarks, told, too_long
 from fenicsmech.mechanism import Force
 from fenicsmech.plot import MechanismShape
 from fenicsmech.polygons import edge_loops
@@ -90,7 +90,7 @@ class Solver:
         except TooLong:
             emit({"event": "failed", **too_long(longest)})
         except FenicsmechError as error:
-            emit({"event": "failed", **told(error)})
+            emit({"event": "failed", **explained(error)})
         except Exception as error:  # whatever happens here, the next gesture is answered
             reason = f"{type(error).__name__}: {error}"
             emit({"event": "failed", "part": "solver", "problem": reason[:400], "remedy": "Undo the last change"})
@@ -256,7 +256,7 @@ class Work:
                     "iterate": iterate,
                     "points": [self._point(own) for own in frames],
                     "remarks": [] if curve is None else remarks(curve),
-                    "failed": failure and told(failure),
+                    "failed": failure and explained(failure),
                 }
             )
             if iterate is None:
@@ -310,7 +310,7 @@ class Work:
         try:
             movable, found = self._with_moves(along, along.initial if at is None else at)
         except EquilibriumError:
-            return  # the curve that ends early is told already
+            return  # the curve that ends early is reported already
         self._solver.check()
         loads, by_loads = self._with_loads()
         rows, curves = 0, []
@@ -390,7 +390,7 @@ class Work:
         try:
             found = problem.linearise(problem.initial if at is None else at)
         except EquilibriumError as error:
-            self._emit({"event": "required", "values": [], "failed": told(error)})
+            self._emit({"event": "required", "values": [], "failed": explained(error)})
             return
         rows = np.split(found.values + found.errors, np.cumsum([target.size for target in problem.targets])[:-1])
         wanted = rows[len(self._project["targets"]) :]

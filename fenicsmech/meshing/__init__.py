@@ -2,6 +2,7 @@
 
 Meshes
     ``mesh_link``       shape + interface sites → ``LinkMesh``
+    ``plan_size``       how much there is to mesh of a link from a file
     ``check_link``      checks of the shape before anything is meshed
     ``InterfaceSite``   region of a link that a joint holds
     ``LinkMesh``        points, cells, and which interface holds each cell (``FREE``: none)
@@ -61,4 +62,5 @@ from fenicsmech.meshing.outline import (
     start_of,
     straight_line,
 )
+from fenicsmech.meshing.part_files import plan_size
 from fenicsmech.meshing.session import gmsh, gmsh_session, muted_output

@@ -23,7 +23,7 @@ _TOLERANCE = 1e-6  # of the extent of a mesh from a file, whose coordinates are 
 
 @check_shape.register
 def _(shape: StepPart, request: MeshRequest) -> None:
-    _require_header(shape.path, "ISO-10303-21", kind="STEP file", part=request.part)
+    _check_file(shape, request.part)
 
 
 @check_shape.register
@@ -31,11 +31,13 @@ def _(shape: MeshPart, request: MeshRequest) -> None:
     if request.half:
         remedy = "Use space='3d', or give the link as a strip, an outline or a STEP file"
         raise DescriptionError(request.part, "the symmetry of a mesh file about its mid-plane is not known", remedy)
-    _require_header(shape.path, "$MeshFormat", kind="gmsh mesh file", part=request.part)
+    _check_file(shape, request.part)
 
 
-def _require_header(path: Path, header: str, *, kind: str, part: str) -> None:
-    """Refuses a file that does not begin with ``header``; gmsh would guess its kind."""
+def _check_file(shape: StepPart | MeshPart, part: str) -> None:
+    """Refuses a file that does not begin as its kind does; gmsh would guess its kind."""
+    step = isinstance(shape, StepPart)
+    path, header, kind = shape.path, *(("ISO-10303-21", "STEP file") if step else ("$MeshFormat", "gmsh mesh file"))
     try:
         with open(path, "rb") as file:
             start = file.read(len(header) + 64).lstrip()
@@ -61,6 +63,33 @@ def _only_solid(path: Path, request: MeshRequest) -> DimTag:
         problem = f"the STEP file {str(path)!r} holds {len(solids) or 'no'} solids"
         raise MeshingError(request.part, problem, "Export exactly one solid body per link")
     return solids[0]
+
+
+def plan_size(shape: StepPart | MeshPart, part: str) -> tuple[float, int]:
+    """How much there is to mesh of a link from a file, before it is meshed.
+
+    Args:
+        shape: with its file.
+        part: for messages.
+
+    Returns:
+        The mean section of a STEP file's solids along z, in mm², and the number of elements of a mesh file.
+
+    Raises:
+        MeshingError: the file cannot be read.
+    """
+    _check_file(shape, part)
+    with gmsh_session(part):
+        if isinstance(shape, MeshPart):
+            gmsh.merge(str(shape.path))
+            counts = [sum(map(len, gmsh.model.mesh.getElements(dim)[1])) for dim in (2, 3)]
+            return 0.0, counts[1] or counts[0]
+        occ, area = gmsh.model.occ, 0.0
+        for dim, tag in occ.importShapes(str(shape.path), format="step"):
+            if dim == 3:
+                _, _, bottom, _, _, top = occ.getBoundingBox(dim, tag)
+                area += abs(occ.getMass(dim, tag)) / (top - bottom)
+    return area, 0
 
 
 def _mesh_solid(shape: StepPart, solid: DimTag, request: MeshRequest) -> LinkMesh:

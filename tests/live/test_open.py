@@ -16,6 +16,7 @@ import pytest
 import fenicsmech as fm
 from fenicsmech.live import (
     Refused,
+    ServerOptions,
     Solver,
     draw,
     example,
@@ -285,6 +286,8 @@ def test_a_link_from_a_file_takes_its_file_along(tmp_path):
     assert "/" not in json.dumps([own.get("shape", {}).get("name", "") for own in project["links"]])
     (own,) = drawing.simulation.scene.mechanism.flexible_links
     assert own.shape.path.read_bytes() == Path("meshes/diagonal.step").read_bytes()
+    with pytest.raises(fm.DescriptionError, match="elements of 0.1 mm, not at most"):
+        draw({**project, "simulation": {**project["simulation"], "size": 0.1}})
     assert 'fm.step_file(Path("part_diagonal.step")' in script(project).replace("'", '"')
 
 
@@ -317,6 +320,11 @@ def test_what_has_no_plain_data_is_refused_by_name(change, reason, remedy):
 def test_a_result_is_opened_with_a_problem_alone():
     with pytest.raises(fm.DescriptionError, match="with a project"):
         live(example("truss-finger"), result=object())
+
+
+def test_a_port_is_given_once():
+    with pytest.raises(fm.DescriptionError, match="beside the options"):
+        live(example("truss-finger"), port=8000, options=ServerOptions())
 
 
 @pytest.mark.parametrize(

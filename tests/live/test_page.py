@@ -92,7 +92,7 @@ class Page:
         """Waits for a condition in JavaScript, and returns its value."""
         end = monotonic() + seconds
         while not (found := self.run(f"return {condition}")):
-            assert monotonic() < end, f"in vain: {condition}; {self.run('return document.body.innerText')}"
+            assert monotonic() < end, f"not in time: {condition}; {self.run('return document.body.innerText')}"
             sleep(0.05)
         return found
 
@@ -606,8 +606,8 @@ def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
     project = project_of(fm.DesignProblem(sim, **wanted)) | {"fit": False}
     page.chrome.execute_script("live.send({kind: 'open', project: arguments[0]})", project)
     page.until("live.store.project.name === 'switch' && live.store.required.length === 1")
-    told = [item.text for item in page.chrome.find_elements(By.CSS_SELECTOR, "#carried li")]
-    assert len(told) == 2 and "reached" in told[0] and "spring" in told[1]
+    listed = [item.text for item in page.chrome.find_elements(By.CSS_SELECTOR, "#carried li")]
+    assert len(listed) == 2 and "reached" in listed[0] and "spring" in listed[1]
     assert page.run("return live.store.curves[0].points.at(-1).displacement") == pytest.approx(15.0)
     page.until("document.body.dataset.solver === 'idle' && live.store.linear")
     page.picture("script")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
 import os
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +22,18 @@ from pathlib import Path
 import aiohttp
 import pytest
 
-from fenicsmech.live import LARGEST, PER_SECOND, Server, ServerOptions, example, serve
+from fenicsmech.files import file_names
+from fenicsmech.live import (
+    LARGEST,
+    MOST_ELEMENTS,
+    PER_SECOND,
+    Refused,
+    Server,
+    ServerOptions,
+    example,
+    read_project,
+    serve,
+)
 
 # answers each task with its targets, but hangs at a displacement of 6.66, dies at 5.55, and writes no JSON at 4.44
 ECHO = """
@@ -28,6 +41,7 @@ import json, sys, time
 print(json.dumps({"event": "ready"}), flush=True)
 for line in sys.stdin:
     task = json.loads(line)
+    print(json.dumps({"event": "began", "task": task["task"]}), flush=True)
     if task["kind"] == "solve":
         if task["project"]["targets"][1]["displacement"] == 6.66:
             time.sleep(1000)
@@ -183,12 +197,7 @@ def test_a_solver_process_that_hangs_is_replaced_at_the_next_gesture():
 
 
 def test_a_solver_process_that_does_not_end_its_task_in_time_is_replaced_and_the_reason_told():
-    begins = ECHO.replace(
-        "        if task",
-        '        print(json.dumps({"event": "began", "task": task["task"]}), flush=True)\n        if task',
-        1,
-    )
-    options = replace(OPTIONS, solver=(sys.executable, "-c", begins), longest_solve=0.2)
+    options = replace(OPTIONS, longest_solve=0.2)
 
     async def test(server, client):
         async with socket(server, client) as page:
@@ -200,6 +209,98 @@ def test_a_solver_process_that_does_not_end_its_task_in_time_is_replaced_and_the
             assert (await until(page, "remark"))["targets"][1]["displacement"] == 7.0
 
     run(test, options=options)
+
+
+def test_a_solver_process_that_hangs_is_replaced_after_a_stop():
+    async def test(server, client):
+        async with socket(server, client) as page:
+            await until(page, "remark")
+            await page.send_str(edit(6.66))
+            await until(page, "solver", state="busy")
+            before = server.solver_pid
+            await asyncio.sleep(0.3)
+            await page.send_str('{"kind": "stop"}')
+            await until(page, "solver", state="idle")
+            while server.solver_pid == before:
+                await asyncio.sleep(0.05)
+
+    run(test, options=replace(OPTIONS, patience=0.5))
+
+
+def test_a_solver_process_that_cannot_be_started_again_is_reported(monkeypatch):
+    create = asyncio.create_subprocess_exec
+
+    async def test(server, client):
+        async def never(*command, **options):
+            raise BlockingIOError("no processes are left")
+
+        async with socket(server, client) as page:
+            await until(page, "remark")
+            monkeypatch.setattr(asyncio, "create_subprocess_exec", never)
+            os.kill(server.solver_pid, signal.SIGKILL)
+            await until(page, "solver", state="failed")
+            await page.send_str(edit(7.5))
+            await until(page, "solver", state="failed")
+            monkeypatch.setattr(asyncio, "create_subprocess_exec", create)
+            await page.send_str(edit(7.0))
+            assert (await until(page, "remark"))["targets"][1]["displacement"] == 7.0
+
+    run(test)
+
+
+def test_what_a_page_pushes_and_edits_ends_with_it():
+    push = '{"kind": "push", "curve": 0, "force": 0.2}'
+    unsettled = json.loads(edit(7.5)) | {"settled": False}
+
+    async def test(server, client):
+        async with socket(server, client) as other:
+            async with socket(server, client) as page:
+                await page.send_str(json.dumps(unsettled))
+                await page.send_str(push)
+                await until(other, "solver", state="busy", task=3)
+            assert (await until(other, "solver", state="busy", task=4)) and not server.session.solved
+            await other.send_str(edit(6.0))
+            await other.send_str('{"kind": "undo"}')
+            while (found := await until(other, "project"))["project"]["targets"][1]["displacement"] != 7.5:
+                pass
+            assert found["undo"]
+
+    run(test)
+
+
+def test_curves_of_another_project_are_not_those_of_one_that_is_opened_or_opened_again():
+    async def kinds(server, client):
+        async with socket(server, client) as page:
+            await page.send_str('{"kind": "stop solid"}')
+            found = []
+            while not found or found[-1]["heard"] < 1:
+                found.append(json.loads((await page.receive(timeout=30)).data))
+            return {event["event"] for event in found}, next(own for own in found if own["event"] == "first")["curves"]
+
+    async def test(server, client):
+        async with socket(server, client) as page:
+            while not (first := (await until(page, "first"))["curves"]):
+                pass
+            await page.send_str('{"kind": "example", "name": "snapping-switch"}')
+            await until(page, "project", opened=2)
+            events, curves = await kinds(server, client)
+            assert "curve" not in events and "errors" not in events and not curves
+            await page.send_str('{"kind": "undo"}')
+            await until(page, "project", opened=1)
+            assert (await kinds(server, client))[1] == first
+
+    once = ALWAYS.replace('["task"]\n', '["task"]\n    if task > 1:\n        continue\n', 1)
+    run(test, options=ServerOptions(solver=(sys.executable, "-c", once), stored=None))
+
+
+def test_a_request_without_a_path_is_refused():
+    async def test(server, _):
+        reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+        writer.write(f"OPTIONS * HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n".encode())
+        assert b" 403 " in await reader.readline()
+        writer.close()
+
+    run(test)
 
 
 def test_a_page_has_stored_results_of_its_project_before_the_solver_answers(tmp_path, monkeypatch):
@@ -413,7 +514,7 @@ def test_project_and_script_are_downloads_and_nothing_else_is():
     run(test)
 
 
-# -- hostile messages ---
+# -- hostile projects and messages ---
 
 ODDITIES = ({"hostile": 1}, [[[]]], math.nan, math.inf, -math.inf, 10**400, "\x00", "x" * 1000, {"__class__": "x"})
 
@@ -474,6 +575,37 @@ def hostile(count, seed):
             yield json.dumps({"kind": "edit", "changes": [change], "settled": rng.random() < 0.5})
 
 
+NAMES = ("../../x", "/x", "a/b", "..", "a b", "a-b", "A-B", "\u202e\u0301", "x" * 160, "\u6881" * 160)
+
+
+def test_whatever_project_is_read_has_files_of_its_folder_and_not_too_many_elements(tmp_path):
+    rng, text, kept = random.Random(2), json.dumps(example("truss-finger")), 0
+    names = [own["name"] for own in example("truss-finger")["links"]]
+    for _ in range(300):
+        chosen, found = rng.sample(NAMES, len(names)), text
+        for before, after in zip(names, chosen, strict=True):
+            found = found.replace(f'"{before}"', json.dumps(after))
+        project = json.loads(found)
+        shapes, size = [own["shape"] for own in project["links"] if "shape" in own], 10 ** rng.uniform(-3, 3)
+        project["simulation"] |= {"size": size, "sizes": {rng.choice(chosen): 10 ** rng.uniform(-3, 3)}}
+        for own in shapes:
+            own["thickness"] *= 10 ** rng.uniform(-3, 2)
+        try:
+            project = read_project(project)
+        except Refused as refused:
+            assert refused.place == "simulation.size" or "thickness" in refused.place
+            continue
+        kept += 1
+        for own in shapes:
+            length = sum(math.dist(*ends) for ends in itertools.pairwise(own["line"]))
+            name = next(link["name"] for link in project["links"] if link.get("shape") == own)
+            finest = size * project["simulation"]["sizes"].get(name, 1.0)
+            assert length * own["thickness"] / (0.43 * finest**2) <= MOST_ELEMENTS
+        for name in file_names(own["name"] for own in project["links"]):
+            assert (tmp_path / f"{name}.step").resolve().parent == tmp_path.resolve()
+    assert 50 < kept < 250
+
+
 def test_ten_thousand_hostile_messages_are_refused_and_change_nothing():
     messages = list(hostile(10_000, seed=1))
 
@@ -486,10 +618,11 @@ def test_ten_thousand_hostile_messages_are_refused_and_change_nothing():
                 for _ in some:
                     assert "messages a second" not in (await until(page, "refused"))["problem"]
         async with socket(server, client) as page:
-            await page.send_str("x" * (LARGEST + 1))
-            while (message := await page.receive(timeout=30)).type is aiohttp.WSMsgType.TEXT:
-                pass
-            assert message.data == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
+            with suppress(aiohttp.ClientOSError, ConnectionError):  # it may be closed before all is sent
+                await page.send_str("x" * (LARGEST + 1))
+                while (message := await page.receive(timeout=30)).type is aiohttp.WSMsgType.TEXT:
+                    pass
+                assert message.data == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
         return server.session
 
     session = run(test)

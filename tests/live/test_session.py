@@ -11,6 +11,7 @@ import pytest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.live import (
     LARGEST,
+    LARGEST_PROJECT,
     Refused,
     Session,
     edited,
@@ -81,6 +82,40 @@ def test_a_project_that_is_none_is_refused_with_its_place(finger, path, value, p
     with pytest.raises(Refused) as refused:
         read_project(data)
     assert place in refused.value.place
+
+
+def test_elements_of_single_links_may_not_be_too_small(finger):
+    simulation = finger["simulation"]
+    finer = {**simulation, "sizes": {"diagonal": 0.05}}
+    with pytest.raises(Refused) as refused:
+        read_project(finger | {"simulation": finer})
+    assert refused.value.place == "simulation.size" and "elements" in refused.value.problem
+    assert read_project(finger | {"simulation": finer | {"size": 10.0 * simulation["size"]}})
+
+
+def filled(finger, left):
+    """A project with files of links that leaves so many bytes of the largest one."""
+    project = deepcopy(finger)
+    own = next(link for link in project["links"] if link["kind"] == "flexible")
+    own["shape"] = {"kind": "mesh", "name": "a.msh", "content": "x", "depth": 1.0}
+    rest = LARGEST_PROJECT - len(json.dumps(project | {"design": None}, separators=(",", ":")).encode()) - left
+    files = [own, *(deepcopy(own) | {"name": f"link {k}"} for k in range(3))]
+    rest -= sum(len(json.dumps(file, separators=(",", ":"))) + 1 for file in files[1:])
+    for k, file in enumerate(files):
+        file["shape"]["content"] = "x" * (1 + rest // 4 + (rest % 4 if k == 0 else 0))
+    return {**project, "links": [*project["links"], *files[1:]]}
+
+
+def test_the_largest_project_is_opened_after_it_was_saved_and_a_larger_one_is_none(finger):
+    design = {"offsets": [-1.2345678901234567e-05] * 4800, "handles": [-1.2345678901234567e-05] * 4800}
+    largest = filled(finger, 20) | {"design": design}
+    session = Session(largest)
+    saved = json.loads(json.dumps(session.project, indent=1, ensure_ascii=False))
+    message = json.dumps({"kind": "open", "project": saved}, separators=(",", ":"))
+    session.answer(read_message(message))
+    assert session.project == largest
+    with pytest.raises(Refused, match="MB, not at most 2 MB"):
+        read_project(filled(finger, -20))
 
 
 def test_a_design_of_as_many_links_as_a_project_may_have_is_read(finger):
@@ -164,14 +199,44 @@ def test_a_gesture_that_is_cancelled_leaves_what_was_before_it_and_the_fit_that_
     for interrupted in (False, True):
         if interrupted:
             session.answer({"kind": "fit"})
+        steps = session.can_undo, session.can_redo
         for value in (8.0, 7.5):
             session.answer(moved(value, settled=False))
         cancelled = session.answer({"kind": "cancel"})
         assert cancelled.changed and cancelled.task["fit"] == interrupted and cancelled.task["project"] == finger
-        assert session.project == finger and not session.can_undo and session.can_redo
+        assert session.project == finger and steps == (session.can_undo, session.can_redo) == (
+            interrupted,
+            not interrupted,
+        )
     session.answer(moved(8.0))
     late = session.answer({"kind": "cancel"})
     assert late.task is None and not late.changed and session.project["targets"][1]["displacement"] == 8.0
+
+
+def test_a_fit_is_a_step_after_which_nothing_is_redone(finger):
+    session = Session(finger)
+    session.answer(moved(7.2))
+    session.answer({"kind": "undo"})
+    session.answer({"kind": "fit"})
+    session.designed({"offsets": [0.5] * 12, "handles": []})
+    with pytest.raises(Refused, match="nothing"):
+        session.answer({"kind": "redo"})
+    session.answer({"kind": "undo"})
+    assert session.project == finger
+    session.answer({"kind": "redo"})
+    assert session.project["design"]["offsets"] == [0.5] * 12
+
+
+def test_a_gesture_whose_page_is_gone_is_settled(finger):
+    session = Session(finger)
+    assert not session.settle()
+    session.answer(moved(8.0, settled=False))
+    assert session.settle()
+    session.answer(moved(7.0, settled=False))
+    session.answer(moved(6.6))
+    for before in (8.0, 9.0):
+        session.answer({"kind": "undo"})
+        assert session.project["targets"][1]["displacement"] == before
 
 
 def test_shapes_follow_targets_but_not_those_set_by_hand(finger):
@@ -190,6 +255,17 @@ def test_what_was_opened_is_what_reset_goes_back_to(finger):
     session.answer(moved(7.0))
     session.answer({"kind": "reset"})
     assert session.project == other
+    for _ in range(3):
+        session.answer({"kind": "undo"})
+    assert session.project == finger and session.opened == 1 and session.untouched
+    session.answer({"kind": "redo"})
+    assert session.project == other and session.opened == 2 and session.untouched
+    session.answer({"kind": "undo"})
+    session.answer(moved(7.0))
+    session.answer({"kind": "reset"})
+    assert session.project == finger
+    session.answer({"kind": "open", "project": other})
+    assert session.opened == 3
 
 
 def test_a_curve_of_a_new_force_is_added_and_removed_with_its_target_and_stands_in_the_script(finger):
@@ -231,7 +307,7 @@ def test_a_curve_of_a_new_force_is_added_and_removed_with_its_target_and_stands_
         '{"kind": "push", "curve": 0, "force": 1, "by": [1, null]}',
         '{"kind": "edit", "changes": [{"kind": "set", "path": [-1], "value": 0}], "settled": true}',
         '{"kind": "edit", "changes": [{"kind": "eval", "path": ["a"], "value": 0}], "settled": true}',
-        "x" * (LARGEST + 1),
+        pytest.param("x" * (LARGEST + 1), id="too large"),
     ],
 )
 def test_what_is_no_message_is_refused(text):
@@ -245,7 +321,7 @@ def test_what_is_no_message_is_refused(text):
         {"kind": "redo"},
         {"kind": "example", "name": "../../etc/passwd"},
         {"kind": "push", "curve": 3, "force": 1.0},
-        {"kind": "push", "curve": 0, "force": 1.0, "at": {"link": "nobody", "place": [0, 0]}, "by": [1.0, 0.0]},
+        {"kind": "push", "curve": 0, "force": 1.0, "at": {"link": "nobody" * 20, "place": [0, 0]}, "by": [1.0, 0.0]},
         {"kind": "open", "project": {"format": "x"}},
         {"kind": "edit", "settled": True, "changes": [{"kind": "set", "path": ["__class__"], "value": 0}]},
         {"kind": "edit", "settled": True, "changes": [{"kind": "remove", "path": ["links", 0]}]},

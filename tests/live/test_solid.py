@@ -78,17 +78,17 @@ WAITS = 'import json, sys, time; json.load(sys.stdin); print(\'{"state": "solvin
 
 def test_a_job_whose_time_is_over_is_ended_and_told_with_its_remedy():
     async def run():
-        told, failed = [], asyncio.Event()
+        received, failed = [], asyncio.Event()
 
         def receive(event):
-            told.append(event)
+            received.append(event)
             if event["state"] == "failed":
                 failed.set()
 
         job = Job((sys.executable, "-c", WAITS), receive, longest=1.0)
         await job.start({})
         await asyncio.wait_for(failed.wait(), 30)
-        return told[-1], await job.stop()
+        return received[-1], await job.stop()
 
     failed, stopped = asyncio.run(run())
     assert "longer than 1 s" in failed["problem"] and "larger elements" in failed["remedy"] and not stopped
@@ -105,17 +105,17 @@ def test_a_job_whose_time_is_over_is_ended_and_told_with_its_remedy():
 )
 def test_a_job_is_ended_at_any_time_and_one_that_dies_is_told(code, state):
     async def run():
-        told, heard = [], asyncio.Event()
+        states, heard = [], asyncio.Event()
 
         def receive(event):
-            told.append(event["state"])
+            states.append(event["state"])
             heard.set()
 
         job = Job((sys.executable, "-c", code), receive)
         await job.start({})
         await asyncio.wait_for(heard.wait(), 30)
         stopped = await asyncio.wait_for(job.stop(), 30)
-        return told, stopped
+        return states, stopped
 
-    told, stopped = asyncio.run(run())
-    assert (told, stopped) == ((["solving"], True) if state is None else ([state], stopped))
+    states, stopped = asyncio.run(run())
+    assert (states, stopped) == ((["solving"], True) if state is None else ([state], stopped))

@@ -487,6 +487,16 @@ def test_pictures_and_animations_are_made_of_every_curve(tmp_path):
         assert len({path.read_bytes() for path in paths}) == len(paths)
 
 
+def test_names_of_links_lead_to_files_of_the_folder_alone(finished, tmp_path):
+    project = json.loads(json.dumps(finished[0]).replace('"diagonal"', json.dumps(f"../{tmp_path}/diagonal")))
+    folder = tmp_path / "files"
+    folder.mkdir()
+    for what in ("step", "dxf"):
+        (path,) = export(project, what, folder)
+        assert path.parent == folder
+    assert list(tmp_path.iterdir()) == [folder] and {path.parent for path in tmp_path.rglob("*.*")} == {folder}
+
+
 def test_names_of_a_project_cannot_put_code_into_its_script(finished, tmp_path):
     project, _ = finished
     name = '"""+__import__("os").system("x")+"""'

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenicsmech.mechanism import Disc, gmsh_mesh, strip
-from fenicsmech.meshing import InterfaceSite, LinkMesh, cell_measures, mesh_link
+from fenicsmech.mechanism import Disc, gmsh_mesh, step_file, strip
+from fenicsmech.meshing import InterfaceSite, LinkMesh, cell_measures, mesh_link, plan_size
 
 MESHES = Path(__file__).parents[2] / "meshes"
 SITES = [InterfaceSite(at, Disc(3.0), name=f"pin at {at}") for at in ((0.0, 0.0), (60.0, 0.0))]
@@ -60,6 +60,19 @@ def test_curved_cells_are_read_by_their_corners_and_turned_to_positive_area(tmp_
     mesh = mesh_link("square", gmsh_mesh(path, depth=1.0), dim=2, size=4.0)
     assert cell_measures(mesh.points, mesh.cells) == pytest.approx([8.0, 8.0])
     assert mesh.points.shape == (4, 2)
+
+
+@pytest.mark.parametrize("dim, file, size", [(2, "strip2d.msh", 1.5), (3, "strip3d.msh", 2.0)])
+def test_elements_of_a_mesh_file_are_counted_before_it_is_a_link(dim, file, size):
+    shape = gmsh_mesh(MESHES / file, depth=10.0)
+    assert plan_size(shape, "strip") == (0.0, len(mesh_link("strip", shape, SITES, dim=dim, size=size).cells))
+
+
+def test_area_of_a_step_file_is_known_before_it_is_meshed():
+    shape = step_file(MESHES / "diagonal.step", depth=20.0)
+    area, given = plan_size(shape, "diagonal")
+    mesh = mesh_link("diagonal", shape, dim=2, size=3.0)
+    assert area == pytest.approx(cell_measures(mesh.points, mesh.cells).sum(), rel=0.01) and not given
 
 
 FILES = ["curved_link.step", "diagonal.step", "strip2d.msh", "strip3d.msh"]

@@ -317,8 +317,7 @@ export class Handles {
     const message = { kind: "push", curve: store.shown, force: pushed.held ? pushed.force : size, ...pushed.held && { at: pushed.held.at, by } };
     const key = JSON.stringify(message);
     if (pushed.asked !== null || !pushed.held && !size || key === pushed.last) return;
-    pushed.asked = pushed.last = key;
-    store.send(message);
+    if (store.send(message)) pushed.asked = pushed.last = key;
   }
 
   answered({ point, at, by, rates }) {

@@ -15,14 +15,15 @@ const $ = (id) => document.getElementById(id);
 
 const store = {
   project: null, mesh: null, curves: {}, errors: {}, peaks: {}, responses: {}, linear: null, misfits: null, first: [],
-  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, active: [], mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null, untargeted: "",
+  shown: 0, load: 0, previewed: null, drag: null, pushed: null, pushing: false, leaning: null, leans: 0, turning: null, stressTop: 0, mode: "move", solid: null, solving: false, waiting: [], required: [], opened: 0, added: null, untargeted: "",
 
   curve() { return this.curves[this.shown]; },
   // The mesh of what is drawn: another curve may still be that of an earlier shape.
   drawnMesh() { const own = this.curve(); return !this.pushed && own ? own.mesh : this.mesh; },
   // The shown curve as it was when the project was opened; null if its load is another one.
   before() {
-    const curve = this.project.curves[this.shown], key = (force, { positions, others }) => JSON.stringify([force, positions, others]);
+    const curve = this.project.curves[this.shown];
+    const key = (force, { positions, others, held, ratios, largest }) => JSON.stringify([force, positions, others, held || false, ratios || null, Math.sign(largest)]);
     const now = key(this.project.forces.find((own) => own.name === curve.force), curve);
     return this.first.find((own) => key(own.force, own) === now) || null;
   },
@@ -129,7 +130,7 @@ const receivers = {
     if (!store.busy) store.waiting.splice(0).forEach((go) => go());
     $("fit").title = store.busy ? "Stop solving" : "Let the shape follow the targets once more";
   },
-  refused({ place, problem }) { store.added = null; tell(`${place ? `${place}: ` : ""}${problem}`, true); },
+  refused({ place, problem }) { store.added = null; handles.failed(); tell(`${place ? `${place}: ` : ""}${problem}`, true); },
   mesh(event) { store.mesh = event; },
   iterate({ number, design, misfits }) {
     store.project.design = design;
@@ -141,6 +142,7 @@ const receivers = {
   curve(event) {
     store.curves[event.curve] = { ...event, mesh: store.mesh };
     delete store.errors[event.curve]; delete store.peaks[event.curve];
+    if (event.iterate === null) delete store.responses[event.curve]; // those of this curve follow, if it has any
     store.pushed = store.leaning = null;
     if (store.turning && store.turning.over) store.turning = null;
     if (!store.drag && !handles.held && !store.turning) store.previewed = null;
@@ -167,7 +169,6 @@ const receivers = {
   },
   linear(event) {
     store.linear = event;
-    store.active = event.active;
     if (!event.whole) tell("The linear preview ends where a curve snaps, ends or is unstable.");
     if (event.active.length) tell(`Held back by ${event.active.join(", ")}. Widen these bounds, or relax a target.`);
     if (store.turning) { store.turning.linear = event; store.turned(); }
@@ -202,7 +203,7 @@ const receivers = {
 
 const transmit = connect(
   (event) => { const receive = receivers[event.event]; if (receive) receive(event); },
-  () => { $("state").textContent = "Not connected. Is the program still running?"; },
+  () => { handles.failed(); $("state").textContent = "Not connected. Is the program still running?"; },
 );
 
 // A message to the server.

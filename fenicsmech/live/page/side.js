@@ -99,9 +99,12 @@ export class Side {
     parts.push(this.group("Design", this.row("shape follows targets", follow),
       element("button", { textContent: "As drawn", title: "The shape before it followed its targets", onclick: () => set(["design"], null) })));
     const file = element("input", { type: "file", accept: ".json,application/json", hidden: true, id: "file", onchange: async () => {
-      if (file.files[0].size > 1e6) { this.store.tell("This file is larger than any project: 1 MB.", true); file.value = ""; return; }
-      try { this.store.send({ kind: "open", project: JSON.parse(await file.files[0].text()) }); }
-      catch { this.store.tell("This file is not JSON. Open one that was saved by the page.", true); }
+      const most = this.store.most.bytes, larger = () => this.store.tell(`This file is larger than any project: ${most / 1e6} MB.`, true);
+      try {
+        const text = file.files[0].size > 20 * most ? null : JSON.stringify(JSON.parse(await file.files[0].text())); // saved with spaces
+        if (text === null || new Blob([text]).size > 1.5 * most) larger();
+        else this.store.send({ kind: "open", project: JSON.parse(text) });
+      } catch { this.store.tell("This file is not JSON. Open one that was saved by the page.", true); }
       file.value = "";
     } });
     const pick = element("select", { title: "Examples", onchange: () => this.store.send({ kind: "example", name: pick.value }) },

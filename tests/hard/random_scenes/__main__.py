@@ -1,7 +1,7 @@
 """Judges random scenes, shows progress and prints the table of outcomes: `python -m tests.hard.random_scenes`.
 
-Verdicts are kept in DIR/seed-SEED.jsonl; the same command goes on after an interruption. Exits with 1 if any is wrong,
-or if an excuse lets off more than its share.
+Verdicts are kept in DIR/seed-SEED.jsonl; the same command goes on after an interruption, with the same code. Exits
+with 1 if any is wrong, or if an excuse lets off more than its share.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import time
 from functools import partial
 from pathlib import Path
 
-from benchmarks.table import ROOT, command, publish
+from benchmarks.table import ROOT, command, publish, revision
 from fenicsmech.files import atomic_write
 
-from .record import append, read
+from .record import CODE, OtherCode, append, read
 from .scene_result import SceneResult, judge
 from .summary import excessive, raw_table, table
 from .worker import Crashed, Worker
@@ -35,7 +35,12 @@ def main() -> int:
         parser.error("--quick scenes are for building; leave --write out, or --quick")
     seeds = range(options.seed, options.seed + options.count)
     path = options.out / f"{'quick' if options.quick else 'seed'}-{options.seed}.jsonl"
-    results = {seed: result for seed, result in read(path).items() if seed in seeds}
+    commit = revision(*CODE)
+    try:
+        known = read(path, commit, lambda entries: SceneResult(**entries))
+    except OtherCode as other:
+        parser.error(str(other))
+    results = {seed: result for seed, result in known.items() if seed in seeds}
     worker, start, before = Worker(partial(judge, quick=options.quick), options.limit), time.monotonic(), len(results)
     for seed in seeds:
         if seed in results:
@@ -45,7 +50,7 @@ def main() -> int:
         except (TimeoutError, Crashed) as failure:
             end = "hangs" if isinstance(failure, TimeoutError) else "crashes"
             results[seed] = SceneResult(seed, "", f"wrong: {end}", str(failure), options.limit)
-        append(path, results[seed])
+        append(path, results[seed].record(), commit)
         done, wrong = len(results), sum(result.wrong for result in results.values())
         left = (time.monotonic() - start) / (done - before) * (options.count - done)
         print(
@@ -54,7 +59,7 @@ def main() -> int:
     worker.close()
     print(file=sys.stderr)
     judged = [results[seed] for seed in seeds]
-    publish("random_scenes", table(judged), write=options.write)
+    publish("random_scenes", table(judged), write=options.write, commit=commit)
     if options.write:
         with atomic_write(_RAW) as file:
             file.write(raw_table(judged))

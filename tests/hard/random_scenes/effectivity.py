@@ -14,7 +14,6 @@ DIR/seed-SEED.jsonl; the same command goes on after an interruption.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import sys
@@ -27,14 +26,16 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from queue import SimpleQueue
+from typing import Any
 
 import fenicsmech as fm
-from benchmarks.table import command, publish
+from benchmarks.table import command, publish, revision
 
 from .blueprint import Blueprint, ContactPlan
 from .designs import DesignScene, design_problem, design_scene
 from .finer import Finer, Shapes, Unsolved, coarse_curve, finer, most_unknowns
 from .generator import random_scene
+from .record import CODE, OtherCode, append, read
 from .scene_result import DESIGNS, INVALID_SHARE
 from .thresholds import THRESHOLDS
 from .worker import Crashed, Worker
@@ -111,12 +112,11 @@ class Judged:
         return {kind: estimate for kind, estimate in found.items() if estimate is not None}
 
     @classmethod
-    def read(cls, line: str) -> Judged:
+    def read(cls, fields: dict[str, Any]) -> Judged:
         """From a line of the file of results."""
-        fields = json.loads(line)
         for name in ("elements", "plane_stress"):
             if own := fields[name]:
-                fields[name] = Estimate(**{**own, "doubts": tuple(own["doubts"])})
+                fields = {**fields, name: Estimate(**{**own, "doubts": tuple(own["doubts"])})}
         return cls(**fields)
 
 
@@ -280,18 +280,6 @@ def faults(judged: Sequence[Judged]) -> list[str]:
     return found
 
 
-def read(path: Path) -> dict[int, Judged]:
-    """Results by seed; a line cut short by a stop is left out."""
-    results = {}
-    for line in path.read_text().splitlines() if path.exists() else ():
-        try:
-            found = Judged.read(line)
-        except ValueError:
-            continue
-        results[found.seed] = found
-    return results
-
-
 def judge_in(workers: SimpleQueue[Worker[Judged]], seed: int, limit: float) -> Judged:
     """The effectivities of a scene by one of the ``workers``, which is free again afterwards."""
     worker = workers.get()
@@ -315,22 +303,24 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("results/effectivity"), metavar="DIR")
     options = parser.parse_args()
     path, wanted = options.out / f"seed-{options.seed}.jsonl", seeds(options.seed, options.count)
-    known, free = read(path), SimpleQueue[Worker[Judged]]()
-    path.parent.mkdir(parents=True, exist_ok=True)
+    free, commit = SimpleQueue[Worker[Judged]](), revision(*CODE)
+    try:
+        known = read(path, commit, Judged.read)
+    except OtherCode as other:
+        parser.error(str(other))
     for _ in range(options.processes):
         free.put(Worker(judge, options.limit))
-    with ThreadPoolExecutor(options.processes) as threads, path.open("a") as file:
+    with ThreadPoolExecutor(options.processes) as threads:
         running = [threads.submit(judge_in, free, seed, options.limit) for seed in wanted if seed not in known]
         for done in as_completed(running):
             found = known[done.result().seed] = done.result()
-            file.write(json.dumps(asdict(found)) + "\n")
-            file.flush()
+            append(path, asdict(found), commit)
             print(f"\r{len(known)}/{len(wanted)} scenes, seed {found.seed} ", end="", file=sys.stderr, flush=True)
     for _ in range(options.processes):
         free.get().close()
     print(file=sys.stderr)
     judged = [known[seed] for seed in wanted]
-    publish("effectivity", table(judged), write=options.write)
+    publish("effectivity", table(judged), write=options.write, commit=commit)
     return int(bool(faults(judged)))
 
 

@@ -25,11 +25,13 @@ from .known_scenes import (
 from .motions import STEP
 from .potential import Potential
 from .reasons import HELD, overstrained, true_reason
+from .record import OtherCode, append, read
 from .residual_check import check
-from .scene_result import judge, judge_frames, judge_sound
+from .scene_result import SceneResult, judge, judge_frames, judge_sound
 from .stability_check import unstable_directions
 from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
+from .worker import Worker
 
 SOUND = st.integers(0, 10**6).map(lambda n: 10 * n + 5)
 SPOILED = st.integers(0, 10**6).map(lambda n: 10 * n + 1)
@@ -180,6 +182,37 @@ def test_errors_are_not_excused_by_what_is_no_equilibrium(solved):
     failure = fm.EquilibriumError("load", "not found", "Give up", last=torn)
     assert overstrained(potential.blueprint, built, failure) is not None
     assert true_reason(potential.blueprint, built, failure) is None
+
+
+def test_verdicts_are_kept_of_one_commit_and_lines_that_are_cut_are_judged_again(tmp_path):
+    path, verdicts = tmp_path / "seed-0.jsonl", [SceneResult(k, "arch", "refused", "µ", 1.0) for k in range(4)]
+
+    def kept(commit):
+        return read(path, commit, lambda entries: SceneResult(**entries))
+
+    assert kept("abc") == {}
+    for verdict in verdicts[:2]:
+        append(path, verdict.record(), "abc")
+    path.write_bytes(path.read_bytes()[:-20])
+    append(path, {"seed": 7, "topology": "of older code"}, "abc")
+    for verdict in verdicts[2:]:
+        append(path, verdict.record(), "abc")
+    assert kept("abc") == {k: verdicts[k] for k in (0, 2, 3)}
+    for other in ("abc, changed since", "def"):
+        with pytest.raises(OtherCode, match="verdicts of abc"):
+            kept(other)
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[1:]))
+    with pytest.raises(OtherCode, match="an unknown commit"):
+        kept("abc")
+
+
+def test_a_judge_that_died_between_two_scenes_is_replaced():
+    worker = Worker(str, 60.0)
+    assert worker(3) == "3"
+    worker._process.kill()
+    worker._process.join()
+    assert worker(4) == "4"
+    worker.close()
 
 
 def test_quick_tables_are_not_published(monkeypatch):

@@ -43,10 +43,12 @@ class Worker(Generic[T]):
             TimeoutError: it hangs.
             Crashed: the process died, or an exception escaped.
         """
+        if self._process is not None and not self._process.is_alive():  # it died between two scenes
+            self.close()
         if self._process is None:
             self._start()
-        self._pipe.send(seed)
         try:
+            self._pipe.send(seed)
             if self._pipe.poll(_WAITING):
                 return self._pipe.recv()
         except (EOFError, ConnectionError):

@@ -1,4 +1,4 @@
-"""What the page is told of errors, snaps, unstable equilibria and ends: each problem with its remedy."""
+"""What the page says of errors, snaps, unstable equilibria and ends: each problem with its remedy."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _MISSED = "Relax a target, widen the thicknesses, or move a joint"
 _MET = 0.01  # relative error of a target
 
 
-def told(error: FenicsmechError) -> dict[str, str]:
-    """An error."""
+def explained(error: FenicsmechError) -> dict[str, str]:
+    """An error as plain data."""
     return {"part": error.part, "problem": error.problem, "remedy": error.remedy}
 
 
