@@ -114,13 +114,15 @@ class Target:
             )
         relation, wanted = next(iter(given.items()), ("least", ()))
         vector = isinstance(wanted, Sequence | np.ndarray) and not isinstance(wanted, str) and np.ndim(wanted) > 0
-        numbers = tuple(wanted) if vector else (wanted,)
+        numbers: tuple = tuple(wanted) if vector else (wanted,)  # type: ignore[arg-type]  # the vector is a sequence
         if given and not numbers:
             raise DescriptionError(part, f"{relation} is empty", "Give a number for each component that is wanted")
         weight = positive(f"weight of a target for the {quantity}", weight)
         if relation in ("at most", "at least") and weight != 1.0:
             raise DescriptionError(
-                part, f"{weight:g} weighs a bound, which holds whatever it weighs", "Leave out weight=…, or give scale=…"
+                part,
+                f"{weight:g} weighs a bound, which holds whatever it weighs",
+                "Leave out weight=…, or give scale=…",
             )
         if quantity.of_state != isinstance(sample, Sample):
             raise DescriptionError(
@@ -203,7 +205,8 @@ def limits(
 
     Args:
         quantity: what is limited; that of a cycle in the cycles from its own sample to each of these.
-        samples: where, one or several, each once; of targets theirs, so that all targets of a problem stand for all its equilibria.
+        samples: where, one or several, each once; of targets theirs, so that all targets of a problem stand for all its
+            equilibria.
         at_most, at_least: the bound.
         scale: to which errors are relative, see ``Target``.
 
@@ -211,10 +214,12 @@ def limits(
         DescriptionError: there is no sample, or not exactly one bound.
     """
     expect("limits", quantity, Quantity, "a quantity", "Give one, such as LargestStress()")
-    several = not isinstance(samples, Sample | Target) and isinstance(samples, Iterable)
-    given = [own.samples if isinstance(own, Target) else (own,) for own in (samples if several else (samples,))]
-    for own in chain.from_iterable(given):
-        expect(f"limits of the {quantity}", own, Sample, "a sample", "Give samples, or targets with some")
+    several = (samples,) if isinstance(samples, Sample | Target) else samples
+    expect(f"limits of the {quantity}", several, Iterable, "a list of samples", "Give samples, or targets with some")
+    given: list[tuple[Sample, ...]] = []
+    for own in several:
+        expect(f"limits of the {quantity}", own, Sample | Target, "a sample", "Give samples, or targets with some")
+        given.append(own.samples if isinstance(own, Target) else (own,))
     found = [sample for sample in dict.fromkeys(chain.from_iterable(given)) if sample != quantity.since]
     if not found:
         raise DescriptionError(f"limits of the {quantity}", "there is no sample", "Give samples, or targets with some")
@@ -375,6 +380,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
             sample_request(simulation, sample, [sample.value])
             on_one(simulation.comm, partial(assemble, simulation.linkage, sample.configuration))
         target.check(simulation.scene, dim)
+        target.quantity.check_materials(simulation.materials)
         if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
             moved = target.sample.moved
             if moved is None or moved[0] != target.quantity.force:
