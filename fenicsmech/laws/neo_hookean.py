@@ -50,7 +50,10 @@ class _TwoConstants(SplitLaw):
 class _Compressible(_TwoConstants):
     """W̃ = μ/2 (tr FᵀF − 3 − 2 ln J) = μ/2 (s + 2 φ), and λ."""
 
-    stable = True
+    @property
+    def stable(self) -> bool:  # type: ignore[override]
+        """Auxetic ones soften as they are stretched: λ < 0."""
+        return self.nu >= 0.0
 
     def distortion(self, strain: Strain) -> Expr:
         return self.mu / 2 * (strain.shear + 2 * log_remainder(strain.j))
