@@ -209,6 +209,11 @@ def test_invalid_bounds(bounds, problem):
     assert "'diagonal'" in caught.value.part
 
 
+def test_bounds_of_thickness_are_any_pair():
+    link = truss().designs[0].link
+    assert fm.SplineDesign(link, 3, thickness=np.array([1, 6])) == fm.SplineDesign(link, 3, thickness=(1.0, 6.0))
+
+
 def test_a_configuration_that_does_not_assemble():
     case = strained(1.0)
     mechanism = case.scene.mechanism

@@ -228,6 +228,15 @@ def test_wanted_components_may_be_an_array_or_the_first_of_a_vector():
     assert along.values(along.from_zero()) == pytest.approx(known.values(known.from_zero())[:1], rel=1e-7)
 
 
+def test_a_group_of_forces_in_a_sample_is_its_forces():
+    own = arm()
+    pair = fm.ForceGroup("pair", {own.push: 1.0, own.pull: -0.5})
+    assert fm.Sample({pair: 4.0}) == fm.Sample({own.push: 4.0, own.pull: -2.0})
+    for loads, problem in (({pair: 1.0, own.push: 1.0}, "'push' is given twice"), ({pair: fm.at(1.0)}, "a group")):
+        with pytest.raises(fm.DescriptionError, match=problem):
+            fm.Sample(loads)
+
+
 def test_invalid_targets_are_refused():
     push, energy, sample = arm().push, fm.StrainEnergy(), fm.Sample({arm().push: 1.0})
     upward = fm.Component(fm.JointForce(arm().clamp), (0, 0, 1))
@@ -250,6 +259,10 @@ def test_invalid_targets_are_refused():
         ),
         (lambda: fm.Target(energy, sample, equals=1.0, scale=0.0), "not positive", "greater"),
         (lambda: fm.Sample({push: fm.at(1.0), arm().pull: fm.at(2.0)}), "two displacements", "at"),
+        (lambda: fm.Sample(push), "not a mapping", "Sample"),
+        (lambda: fm.limits(energy, 3.0, at_most=1.0), "not a list of samples", "targets"),
+        (lambda: fm.Target(fm.Magnitude(push), sample, equals=1.0), "not a quantity", "vector"),
+        (lambda: fm.Rotation(arm().link, joint="wrist"), "not a joint", "mechanism"),
         (lambda: fm.Sample({arm().link: 1.0}), "neither a force nor a motor", "mechanism"),
         (lambda: fm.Sample({arm().motor: 0.1}, fm.Sample({arm().motor: 0.2}).configuration), "two positions", "one"),
         (lambda: fm.Sample({push: 1.0}, "closed"), "not a configuration", "scene"),
@@ -276,6 +289,7 @@ def test_one_limit_over_samples_is_a_target_at_each_of_them_once():
     stress = fm.LargestStress()
     found = fm.limits(stress, [own.both, own.moved, own.both], at_most=30.0)
     assert found == tuple(fm.Target(stress, sample, at_most=30.0) for sample in (own.both, own.moved))
+    assert fm.limits(stress, own.both, at_most=30.0) == found[:1]
     everywhere = fm.limits(stress, own.every(), at_most=30.0)
     assert [target.sample for target in everywhere] == [own.both, own.moved, own.bent]
     # of a cycle to all others
