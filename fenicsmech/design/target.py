@@ -89,9 +89,9 @@ class Target:
             if force is None or displacement is None:
                 missing = "force" if force is None else "displacement"
                 raise DescriptionError(
-                    f"target for {quantity.name!r}",
-                    f"its {missing} is not given",
-                    "Give force=… and displacement=…, or Displacement(force) with Sample(…) and a relation",
+                    f"{missing} of a target for {quantity.name!r}",
+                    "it is not given",
+                    "Give finite force=… and displacement=…, or Displacement(force) with Sample(…) and a relation",
                 )
             equals = finite(f"displacement of a target for {quantity.name!r}", displacement)
             sample = Sample({quantity: finite(f"force of a target for {quantity.name!r}", force)}, configuration)

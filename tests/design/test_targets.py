@@ -250,8 +250,8 @@ def test_invalid_targets_are_refused():
         (lambda: fm.Target(energy, sample, equals="much"), "not a number", "finite"),
         (lambda: fm.Target(energy, sample, equals=[]), "is empty", "each component"),
         (lambda: fm.Target(energy, sample, at_most=1.0, weight=2.0), "weighs a bound", "scale"),
-        (lambda: fm.Target(push), "its force is not given", "Sample"),
-        (lambda: fm.Target(push, force=1.0), "its displacement is not given", "Sample"),
+        (lambda: fm.Target(push), "it is not given", "Sample"),
+        (lambda: fm.Target(push, force=1.0), "it is not given", "Sample"),
         (
             lambda: fm.Target(fm.JointForce(arm().clamp), sample, least=True).check(arm().scene, 2),
             "only a number can be least",
