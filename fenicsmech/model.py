@@ -294,6 +294,7 @@ class MechanismModel:
         mixed: whether each flexible link is in the u–p formulation.
         effects: of the scene.
         placed: points of links that are elsewhere than drawn.
+        stress_options: of the recovery of stresses of the simulation, ``StressOptions``; None: its defaults.
         effect_potentials: potentials of body poses of each effect.
         potentials: all of these.
         spring_potentials: those of springs, which act from the start.
@@ -310,8 +311,9 @@ class MechanismModel:
         materials: Sequence[Material] | None = None,
         shapes: Sequence[Shape] | None = None,
         placed: Mapping[MaterialPoint, PlacedPoint] | None = None,
+        stress: Any = None,
     ) -> None:
-        self.placed = dict(placed or {})
+        self.placed, self.stress_options = dict(placed or {}), stress
         self.mechanism, self.linkage, self.mesh, self.clock = mechanism, linkage, mesh, clock
         self.effects, links = tuple(effects), mechanism.flexible_links
         self.materials = tuple(link.material for link in links) if materials is None else tuple(materials)

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,9 @@ from fenicsmech.simulation import Curve, CurveRequest, Simulation, read_request
 class Experiment:
     """Measurements on one mechanism, or on a specimen in its test rig.
 
+    Readings above zero and those below belong to two runs, each from zero to the farthest: a part that snaps under push
+    starts anew under pull.
+
     Attributes:
         simulation: of it.
         part: the force that was applied.
@@ -62,8 +66,9 @@ class Experiment:
             tests; None: the largest of its measured values, so that experiments count alike.
 
     Raises:
-        DescriptionError: there are not as many forces as displacements, a number is not finite, no force moves
-            anything, an error is not positive, or the simulation belongs to another design.
+        DescriptionError: the simulation or the part is something else, there are not as many forces as displacements, a
+            number is not finite, no force moves anything, an error is not positive, or the simulation belongs to
+            another design.
     """
 
     simulation: Simulation
@@ -75,8 +80,12 @@ class Experiment:
     errors: Any = None
 
     def __post_init__(self) -> None:
+        expect(
+            "measurements", self.simulation, Simulation, "a simulation", "Give fm.Simulation(…) of what was measured"
+        )
         part = f"measurements of {self.simulation.scene.mechanism.name!r}"
         self.simulation.check_drawn(part)
+        expect(part, self.part, Force, "a force", "Give the force that was applied")
         expect(part, self.unknown, Unknown, "what is compared", "Give Unknown.DISPLACEMENT or Unknown.FORCE")
         forces = np.array([finite(f"force among the {part}", value) for value in self.forces])
         displacements = np.array([finite(f"displacement among the {part}", value) for value in self.displacements])
@@ -127,17 +136,22 @@ class Experiment:
         return self.forces if self.unknown is Unknown.DISPLACEMENT else self.displacements
 
     @property
-    def request(self) -> CurveRequest:
-        """The curve through all prescribed values, from the smallest to the largest."""
+    def requests(self) -> tuple[CurveRequest, ...]:
+        """The curves through all prescribed values: from zero upwards, then from zero downwards if some are below."""
         values = sorted(set(self.prescribed.tolist()), key=abs)
+        runs = [value for value in values if value >= 0.0], [value for value in values if value < 0.0]
         by_force = self.unknown is Unknown.DISPLACEMENT
-        return read_request(
-            self.simulation.scene.mechanism,
-            self.part,
-            forces=values if by_force else None,
-            displacements=None if by_force else values,
-            configuration=self.configuration,
-            others=None,
+        return tuple(
+            read_request(
+                self.simulation.scene.mechanism,
+                self.part,
+                forces=run if by_force else None,
+                displacements=None if by_force else run,
+                configuration=self.configuration,
+                others=None,
+            )
+            for run in runs
+            if run
         )
 
 
@@ -150,7 +164,7 @@ class ModulusFit:
         standard_error: of E.
         interval: the 95 % confidence interval of E.
         spread: standard deviation of the residuals relative to the experiments' ``errors``.
-        curves: simulated at the fitted modulus, one per experiment.
+        curves: simulated at the fitted modulus, one per experiment, or two where readings are on both sides of zero.
         residuals: simulated minus measured displacement, or force, per experiment.
         iterations: of Gauss–Newton.
         material: the one given, with the fitted modulus, as ``Simulation.with_material`` takes it.
@@ -245,7 +259,8 @@ class ParameterFit:
         standard_errors: of each fitted parameter, by the material given and by name in ``Law.parameters``.
         intervals: confidence interval of each.
         spread: standard deviation of the residuals relative to the ``errors`` of experiments and tests.
-        curves: simulated with the fitted parameters, one per experiment.
+        curves: simulated with the fitted parameters, one per experiment, or two where readings are on both sides of
+            zero.
         residuals: simulated minus measured displacement or force, per experiment; then stress of the law minus
             measured stress, per test, in the order of materials.
     """
@@ -410,7 +425,7 @@ def _compare(sources: Sequence[_Rig | _TestedSpecimen], values: np.ndarray) -> _
     curves, residuals, slopes = zip(*(source.compare(values) for source in sources), strict=True)
     sizes = np.concatenate([source.errors for source in sources])
     return _Comparison(
-        tuple(curve for curve in curves if curve is not None),
+        tuple(chain.from_iterable(curves)),
         tuple(tuple(own.tolist()) for own in residuals),
         np.concatenate(residuals) / sizes,
         np.concatenate(slopes) / sizes[:, None],
@@ -433,7 +448,7 @@ class _TestedSpecimen:
             raise DescriptionError(f"test {test.name!r}", problem, remedy)
         self._specimen = Specimen(material.law, test.kind, tuple(parameters[k][1] for k in self.concerned))
 
-    def compare(self, values: np.ndarray) -> tuple[None, np.ndarray, np.ndarray]:
+    def compare(self, values: np.ndarray) -> tuple[tuple[()], np.ndarray, np.ndarray]:
         """P − P̄ (n,) and ∂P/∂θ (n, p) at these parameters θ.
 
         Raises:
@@ -445,7 +460,7 @@ class _TestedSpecimen:
         if np.any(lost := ~np.isfinite(stress)):
             problem = f"the law of {self._material.name!r} has no equilibrium at stretch {test.stretches[lost][0]:.4g}"
             raise EquilibriumError(f"test {test.name!r}", problem, "Give a guess nearer to the test")
-        return None, stress - test.stresses, slopes
+        return (), stress - test.stresses, slopes
 
 
 class _Rig:
@@ -457,7 +472,7 @@ class _Rig:
     """
 
     def __init__(self, experiment: Experiment, parameters: Sequence[_Parameter]) -> None:
-        self._experiment, self._request, self.errors = experiment, experiment.request, experiment.errors
+        self._experiment, self._requests, self.errors = experiment, experiment.requests, experiment.errors
         simulation, made_of = experiment.simulation, experiment.simulation.materials
         self._count = len(parameters)
         self.concerned = [k for k, (given, _) in enumerate(parameters) if given in made_of.values()]
@@ -470,19 +485,27 @@ class _Rig:
             kinds.append(LawParameter(name, *(link for link, own in made_of.items() if own == material)))
         self._numbers, self._adjoint = [model.number(kind) for kind in kinds], Sensitivity(model, kinds)
 
-    def compare(self, values: np.ndarray) -> tuple[Curve, np.ndarray, np.ndarray]:
-        """The curve at these parameters θ, computed minus measured values (n,), and their slopes by θ (n, p)."""
+    def compare(self, values: np.ndarray) -> tuple[tuple[Curve, ...], np.ndarray, np.ndarray]:
+        """The curves at these parameters θ, computed minus measured values (n,), and their slopes by θ (n, p)."""
         for number, value in zip(self._numbers, values[self.concerned], strict=True):
             number.set(float(value))
-        curve, part = self._simulation.compute(self._request), self._request.part
+        found: dict[float, tuple[float, np.ndarray]] = {}
+        curves = tuple(self._run(request, found) for request in self._requests)
+        computed, own = zip(*(found[value] for value in self._experiment.prescribed.tolist()), strict=True)
+        slopes = np.zeros((len(self.errors), self._count))
+        slopes[:, self.concerned] = agreed(self._simulation.comm, np.array(own))
+        return curves, np.array(computed) - self._experiment.measured, slopes
+
+    def _run(self, request: CurveRequest, found: dict[float, tuple[float, np.ndarray]]) -> Curve:
+        """One curve; its values and their slopes are added to those ``found``, by prescribed value."""
+        curve, part = self._simulation.compute(request), request.part
         assert isinstance(part, Force), "experiments prescribe forces, or displacements of their points"
         travel, by_force = Displacement(part).on(self._simulation.model), curve.unknown is Unknown.DISPLACEMENT
         # displacements count from the unloaded configuration, which changes unless it is a rigid assembly
         origin = np.zeros(len(self.concerned))
         if curve.unloaded.has_reactions:
             origin = self._gradient(curve.unloaded, LoadControl(0.0), travel).numbers
-        found: dict[float, tuple[float, np.ndarray]] = {}
-        for control, frame in zip(self._request.controls, curve.frames, strict=True):
+        for control, frame in zip(request.controls, curve.frames, strict=True):
             if by_force:
                 slope = self._gradient(frame.state, control, travel).numbers - origin
                 found[control.prescribed] = frame.displacement, slope
@@ -490,12 +513,9 @@ class _Rig:
                 held = DisplacementControl(float(travel.values(frame.state)[0]))
                 by = self._gradient(frame.state, held, ForceMagnitude(part).on(self._simulation.model))
                 found[control.prescribed] = frame.force, by.numbers + by.control * origin
-        computed, own = zip(*(found[value] for value in self._experiment.prescribed.tolist()), strict=True)
-        slopes = np.zeros((len(self.errors), self._count))
-        slopes[:, self.concerned] = agreed(self._simulation.comm, np.array(own))
-        return curve, np.array(computed) - self._experiment.measured, slopes
+        return curve
 
     def _gradient(self, state: State, control: Control, observable: Observable) -> Gradient:
-        solver = self._simulation.solver(self._request.part)
+        solver = self._simulation.solver(self._experiment.part)
         (gradient,) = self._adjoint.gradients(solver, state, control, [observable])
         return gradient

@@ -52,14 +52,14 @@ class SplineDesign:
             runs on beyond them.
         ends_move: whether free ends, to which the centreline runs on beyond the last joint, may move; otherwise they
             stay where they are drawn, like a finger tip that has to reach a place.
-        same: a link or several that are the same part in another place and keep its shape. Joints of links that share a
-            shape cannot be shifted by numbers, and numbers of their depth name all of them.
+        same: a link or several that are the same part in another place and keep its shape. Numbers that shift their
+            joints have to shift all of them as images of one another, and numbers of their depth name all of them.
         mirrored: those that are mirror images of it.
 
     Raises:
         DescriptionError: a number is out of its range, or a link is named twice. Later, by a design problem: no motion
             brings the drawn link to one of ``same`` or ``mirrored``, or numbers shift joints of links that share a
-            shape.
+            shape otherwise than as images of one another.
     """
 
     link: FlexibleLink
@@ -93,11 +93,15 @@ class SplineDesign:
             if len(points(f"ends of the {part}", self.ends, least=2, dimensions=(2,))) > 2:
                 raise DescriptionError(part, f"{len(self.ends)} ends", "Give two points")
         if self.thickness is not None:
-            if not isinstance(self.thickness, Sequence) or len(self.thickness) != 2:
-                raise DescriptionError(part, f"thickness {self.thickness!r}", "Give the least and the largest one")
-            least, most = self.thickness
-            positive(f"least thickness of the {part}", least)
-            finite(f"largest thickness of the {part}", most)
+            try:
+                least, most = self.thickness
+            except (TypeError, ValueError):
+                raise DescriptionError(
+                    part, f"thickness {self.thickness!r}", "Give the least and the largest one"
+                ) from None
+            least = positive(f"least thickness of the {part}", least)
+            most = finite(f"largest thickness of the {part}", most)
+            set_fields(self, thickness=(least, most))
             if not least < most:
                 raise DescriptionError(part, f"thickness from {least:g} to {most:g}", "Give the smaller one first")
 

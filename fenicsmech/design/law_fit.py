@@ -103,7 +103,7 @@ class LawFitOptions:
             again.
         spread: standard deviation of the logarithm of the others' parameters from the given ones; signs are kept.
         seed: of these.
-        evaluations: of the law from each start, at most.
+        evaluations: of the law from each start, at most; a start that needs more does not count.
         tolerance: relative change of parameters, and of the sum of squares, at which the search from a start ends.
         same: relative difference of the sums of squares of equal minima.
         confidence: probability of intervals.
@@ -177,9 +177,9 @@ _OPTIONS = LawFitOptions()
 
 def fit_law(
     law: Law,
-    tests: Sequence[SpecimenTest],
+    tests: SpecimenTest | Sequence[SpecimenTest],
     *,
-    held: Sequence[str] = ("nu",),
+    held: str | Sequence[str] | None = None,
     options: LawFitOptions = _OPTIONS,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> LawFit:
@@ -188,17 +188,22 @@ def fit_law(
     Args:
         law: initial guess, which also says the number of Ogden's terms. Parameters that are zero are so in every
             start.
-        tests: at least one reading more than parameters, in all.
-        held: names of parameters in ``law.parameters`` that keep their values; these tests say little of Poisson's
-            ratio of rubber.
+        tests: one or several, with at least one reading more than parameters, in all.
+        held: names of parameters in ``law.parameters`` that keep their values, one or several; by default "nu" of laws
+            that have it, as these tests say little of Poisson's ratio of rubber, and none of others.
 
     Raises:
         DescriptionError: an unknown parameter is held, all are, there are too few readings, or the tests do not
             determine a parameter.
         EquilibriumError: from no start is a minimum found that the law accepts.
     """
+    expect("fit of a law", law, Law, "a law", "Give an initial guess, such as Yeoh(…)")
     what = f"fit of {type(law).__name__}"
-    tests = tuple(tests)
+    tests = (tests,) if isinstance(tests, SpecimenTest) else tuple(tests)
+    if held is None:
+        held = ("nu",) if "nu" in law.parameters else ()
+    elif isinstance(held, str):
+        held = (held,)
     for test in tests:
         expect(what, test, SpecimenTest, "a test of a specimen", "Give SpecimenTest(kind, stretches, stresses)")
     names = tuple(name for name in law.constants if name not in held)
@@ -226,7 +231,7 @@ class _Search:
 
     def best(self) -> LawFit:
         options, generator = self._options, np.random.default_rng(self._options.seed)
-        laws, least = None, np.inf
+        laws, least, unfinished = None, np.inf, 0
         for trial in range(options.starts):
             factors = np.exp(options.spread * generator.standard_normal(len(self._start))) if trial else 1.0
             start = self._start * factors
@@ -242,6 +247,9 @@ class _Search:
                 gtol=None,
                 max_nfev=options.evaluations,
             )
+            if found.status == 0:  # out of evaluations, not at a minimum
+                unfinished += 1
+                continue
             law = self._accepted(found.x)
             again = abs(found.cost - least) <= options.same * least
             if law is not None and found.cost < least:
@@ -249,6 +257,13 @@ class _Search:
             if again:
                 break
         if laws is None:
+            if unfinished:
+                raise EquilibriumError(
+                    self._what,
+                    f"from {counted(unfinished, 'start')} the search is not at a minimum after "
+                    f"{counted(options.evaluations, 'evaluation')}, and from none it is",
+                    "Give LawFitOptions(evaluations=…) more, or a law nearer to the tests, in their units",
+                )
             raise EquilibriumError(
                 self._what,
                 f"from none of {counted(options.starts, 'start')} does the search end at a law that can be",

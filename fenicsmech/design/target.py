@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
 
@@ -15,10 +15,10 @@ from fenicsmech.design.numbers import Number
 from fenicsmech.errors import DescriptionError, counted, expect, finite, positive, set_fields
 from fenicsmech.mechanism import DRAWN, Configuration, Force, Scene, Units
 from fenicsmech.multibody import assemble
-from fenicsmech.quantities import Displacement, ForceMagnitude, Quantity, Sample
+from fenicsmech.quantities import Component, Displacement, ForceMagnitude, Magnitude, Quantity, Sample
 from fenicsmech.simulation import CurveRequest, Simulation, read_request
 
-Numbers = float | Sequence[float]
+Numbers = float | Sequence[float] | np.ndarray
 
 
 @dataclass(frozen=True, init=False)
@@ -36,13 +36,15 @@ class Target:
     Args:
         quantity: the quantity, or a force.
         sample: the equilibrium at which it is evaluated; none for quantities of links at rest.
-        equals: wanted value; of a vector as many components as are wanted of it, counted from the first.
+        equals: wanted value; of a vector a sequence or array of as many components as are wanted of it, counted from
+            the first.
         at_most, at_least: bounds instead.
-        least: the quantity is made as small as possible instead.
-        weight: of its squared relative error, or of the minimised quantity, in the objective.
+        least: the quantity, a number, is made as small as possible instead.
+        weight: of its squared relative error, or of the minimised quantity, in the objective; bounds have none.
         scale: to which errors are relative, in the unit of the quantity. By default the wanted value's size |ū|, or a
-            tenth of the largest one wanted of quantities in the same unit where that is more; for a minimised quantity
-            its value as drawn, or at the start where the drawn design does not carry its loads.
+            tenth of the largest one that quantities of the same kind are to equal, where that is more; the size of a
+            bound, or where it is zero a tenth of the largest value wanted of quantities of its kind; for a minimised
+            quantity its value as drawn, or at the start where the drawn design does not carry its loads.
         force, displacement, configuration: of the short form.
 
     Attributes:
@@ -50,9 +52,10 @@ class Target:
         relation: "equals", "at most", "at least" or "least".
         wanted: components of the wanted value or bound; empty for a minimised quantity.
         scale: if it was given.
+        vector: whether components are wanted, rather than one number.
 
     Raises:
-        DescriptionError: a number is invalid, or there is not exactly one relation.
+        DescriptionError: a number is invalid, there is not exactly one relation, or a bound has a weight.
     """
 
     quantity: Quantity
@@ -61,6 +64,7 @@ class Target:
     wanted: tuple[float, ...]
     weight: float
     scale: float | None
+    vector: bool = field(compare=False, repr=False)
 
     def __init__(
         self,
@@ -82,6 +86,13 @@ class Target:
                 raise DescriptionError(
                     f"target of {quantity.name!r}", "a force alone is not a quantity", "Give Displacement(force)"
                 )
+            if force is None or displacement is None:
+                missing = "force" if force is None else "displacement"
+                raise DescriptionError(
+                    f"{missing} of a target for {quantity.name!r}",
+                    "it is not given",
+                    "Give finite force=… and displacement=…, or Displacement(force) with Sample(…) and a relation",
+                )
             equals = finite(f"displacement of a target for {quantity.name!r}", displacement)
             sample = Sample({quantity: finite(f"force of a target for {quantity.name!r}", force)}, configuration)
             quantity = Displacement(quantity)
@@ -102,7 +113,17 @@ class Target:
                 part, f"it has {len(given) + bool(least)} relations", "Give one of equals, at_most, at_least and least"
             )
         relation, wanted = next(iter(given.items()), ("least", ()))
-        numbers = tuple(wanted) if isinstance(wanted, Sequence) and not isinstance(wanted, str) else (wanted,)
+        vector = isinstance(wanted, Sequence | np.ndarray) and not isinstance(wanted, str) and np.ndim(wanted) > 0
+        numbers: tuple = tuple(wanted) if vector else (wanted,)  # type: ignore[arg-type]  # the vector is a sequence
+        if given and not numbers:
+            raise DescriptionError(part, f"{relation} is empty", "Give a number for each component that is wanted")
+        weight = positive(f"weight of a target for the {quantity}", weight)
+        if relation in ("at most", "at least") and weight != 1.0:
+            raise DescriptionError(
+                part,
+                f"{weight:g} weighs a bound, which holds whatever it weighs",
+                "Leave out weight=…, or give scale=…",
+            )
         if quantity.of_state != isinstance(sample, Sample):
             raise DescriptionError(
                 part,
@@ -117,8 +138,9 @@ class Target:
             sample=sample,
             relation=relation,
             wanted=tuple(finite(f"wanted value of the {part}", value) for value in numbers),
-            weight=positive(f"weight of a target for the {quantity}", weight),
+            weight=weight,
             scale=None if scale is None else positive(f"scale of the {part}", scale),
+            vector=bool(given) and vector,
         )
 
     @property
@@ -144,7 +166,13 @@ class Target:
         """
         self.quantity.check(scene, dim)
         size = self.quantity.size(dim)
-        if len(self.wanted) > size or self.size == 1 < size:
+        if size > 1 and self.relation == "least":
+            raise DescriptionError(
+                f"target of the {self.quantity}",
+                f"it has {counted(size, 'component')}, and only a number can be least",
+                "Give Magnitude(…) of it, or Component(…, direction=…)",
+            )
+        if len(self.wanted) > size or (size > 1 and not self.vector):
             raise DescriptionError(
                 f"target of the {self.quantity}",
                 f"it has {counted(size, 'component')} and {counted(self.size, 'wanted value')}",
@@ -164,7 +192,7 @@ class Target:
 
 def limits(
     quantity: Quantity,
-    samples: Iterable[Sample | Target],
+    samples: Sample | Target | Iterable[Sample | Target],
     *,
     at_most: Numbers | None = None,
     at_least: Numbers | None = None,
@@ -177,14 +205,21 @@ def limits(
 
     Args:
         quantity: what is limited; that of a cycle in the cycles from its own sample to each of these.
-        samples: where, each once; of targets theirs, so that all targets of a problem stand for all its equilibria.
+        samples: where, one or several, each once; of targets theirs, so that all targets of a problem stand for all its
+            equilibria.
         at_most, at_least: the bound.
         scale: to which errors are relative, see ``Target``.
 
     Raises:
         DescriptionError: there is no sample, or not exactly one bound.
     """
-    given = (own.samples if isinstance(own, Target) else (own,) for own in samples)
+    expect("limits", quantity, Quantity, "a quantity", "Give one, such as LargestStress()")
+    several = (samples,) if isinstance(samples, Sample | Target) else samples
+    expect(f"limits of the {quantity}", several, Iterable, "a list of samples", "Give samples, or targets with some")
+    given: list[tuple[Sample, ...]] = []
+    for own in several:
+        expect(f"limits of the {quantity}", own, Sample | Target, "a sample", "Give samples, or targets with some")
+        given.append(own.samples if isinstance(own, Target) else (own,))
     found = [sample for sample in dict.fromkeys(chain.from_iterable(given)) if sample != quantity.since]
     if not found:
         raise DescriptionError(f"limits of the {quantity}", "there is no sample", "Give samples, or targets with some")
@@ -309,15 +344,24 @@ class Comparison:
             return target.scale
         if target.relation == "least":
             return abs(drawn) if drawn else 1.0
-        unit = target.quantity.unit(self._units)
-        alike = [other for other in self.targets if other.quantity.unit(self._units) == unit]
-        largest = max(float(np.linalg.norm(other.wanted)) for other in alike)
-        scale = max(float(np.linalg.norm(target.wanted)), 0.1 * largest)
+        scale = float(np.linalg.norm(target.wanted))
+        if target.relation == "equals" or scale == 0.0:
+            alike = [other for other in self.targets if self._kind(other) == self._kind(target)]
+            if target.relation == "equals":
+                alike = [other for other in alike if other.relation == "equals"]
+            scale = max(scale, 0.1 * max(float(np.linalg.norm(other.wanted)) for other in alike))
         if scale == 0.0:
             raise DescriptionError(
                 f"target of the {target.name}", "zero is wanted, to which no error is relative", "Give scale=…"
             )
         return scale
+
+    def _kind(self, target: Target) -> tuple[type[Quantity], str]:
+        """What is measured, and its unit: a component or magnitude is of the kind of its vector."""
+        quantity = target.quantity
+        while isinstance(quantity, Component | Magnitude):
+            quantity = quantity.vector
+        return type(quantity), quantity.unit(self._units)
 
 
 def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
@@ -336,6 +380,7 @@ def check_targets(simulation: Simulation, targets: Sequence[Target]) -> None:
             sample_request(simulation, sample, [sample.value])
             on_one(simulation.comm, partial(assemble, simulation.linkage, sample.configuration))
         target.check(simulation.scene, dim)
+        target.quantity.check_materials(simulation.materials)
         if target.sample is not None and isinstance(target.quantity, ForceMagnitude):
             moved = target.sample.moved
             if moved is None or moved[0] != target.quantity.force:

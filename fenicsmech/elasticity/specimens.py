@@ -24,7 +24,7 @@ from ufl import as_matrix, diff
 
 from fenicsmech.elasticity.models import contracted
 from fenicsmech.errors import DescriptionError, point_text, real_array
-from fenicsmech.laws import Formulas, Law, number
+from fenicsmech.laws import Formulas, Law, LawForm, number
 
 SPECIMENS = ("uniaxial", "planar", "equibiaxial")
 """Kinds of specimens."""
@@ -77,10 +77,9 @@ class Specimen:
 
     def __init__(self, law: Law, kind: str, by: tuple[str, ...] = ()) -> None:
         _check_axes(law)
-        form = tuple((name, len(value) if isinstance(value, tuple) else -1) for name, value in vars(law).items())
         self._by, self._kind = by, check_kind(kind)
         self._count = 2 if _sides_differ(law, kind) else 1
-        self._free, self._formulas = _formulas(_Form(law, form), kind == "uniaxial", self._count, by)
+        self._free, self._formulas = _formulas(LawForm(law), kind == "uniaxial", self._count, by)
 
     def response(self, law: Law, stretches: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """P (n,) and ∂P/∂θ (n, k) at ``stretches`` (n,); NaN where there is no equilibrium."""
@@ -164,21 +163,8 @@ def _solved(matrices: NDArray, right: NDArray) -> NDArray:
     return np.array([c * first - b * second, a * second - b * first]) / (a * c - b * b)
 
 
-class _Form:
-    """A law as the key of its formulas: of its class and the number of its terms, not of its numbers."""
-
-    def __init__(self, law: Law, form: tuple) -> None:
-        self.law, self._key = law, (type(law), form)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Form) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
-
-
 @lru_cache(maxsize=64)
-def _formulas(form: _Form, sides_free: bool, count: int, by: tuple[str, ...]) -> tuple[Formulas, Formulas]:
+def _formulas(form: LawForm, sides_free: bool, count: int, by: tuple[str, ...]) -> tuple[Formulas, Formulas]:
     """(w_s, w_ss) and (w, w_λ, w_λs, w_ss, w_λθ, w_sθ) of λ − 1, κ − 1, s − 1 and the law's parameters."""
     numbers = {name: number() for name in form.law.parameters}
     pull, kept, free = number(), number(), [number() for _ in range(count)]

@@ -10,7 +10,7 @@
 - ``directed``, ``orthotropic``, ``transversely_isotropic``: laws with directions fixed to a link
 """
 
-from fenicsmech.laws.evaluation import Formulas, number
+from fenicsmech.laws.evaluation import Formulas, LawForm, number
 from fenicsmech.laws.gent import Gent
 from fenicsmech.laws.held import undifferentiated
 from fenicsmech.laws.law import Law

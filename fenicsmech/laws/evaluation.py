@@ -18,6 +18,8 @@ from ufl.algorithms import expand_derivatives
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_post_traversal
 
+from fenicsmech.laws.law import Law
+
 _UFUNCS: dict[type, Callable[..., NDArray]] = {
     node.Sum: np.add,
     node.Product: np.multiply,
@@ -58,6 +60,19 @@ _UFUNCS: dict[type, Callable[..., NDArray]] = {
 def number() -> Expr:
     """A number as formulas see it, whose value evaluation gives."""
     return variable(as_ufl(1.0))
+
+
+class LawForm:
+    """A law as the key of its formulas: of its class and the number of its terms, not of its numbers."""
+
+    def __init__(self, law: Law) -> None:
+        self.law, self._key = law, (type(law), tuple(law.parameters))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, LawForm) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
 
 
 class Formulas:

@@ -13,7 +13,7 @@ from ufl import det, sqrt, tr
 from ufl.core.expr import Expr
 
 from fenicsmech.errors import DescriptionError, finite, positive, set_fields
-from fenicsmech.laws.remainders import cube_root_remainder, log_remainder
+from fenicsmech.laws.remainders import log_remainder
 from fenicsmech.laws.split import LOGARITHMIC, QUADRATIC, SIMO, SplitLaw
 from fenicsmech.laws.strain import Strain
 
@@ -50,7 +50,10 @@ class _TwoConstants(SplitLaw):
 class _Compressible(_TwoConstants):
     """W̃ = μ/2 (tr FᵀF − 3 − 2 ln J) = μ/2 (s + 2 φ), and λ."""
 
-    stable = True
+    @property
+    def stable(self) -> bool:  # type: ignore[override]
+        """Auxetic ones soften as they are stretched: λ < 0."""
+        return self.nu >= 0.0
 
     def distortion(self, strain: Strain) -> Expr:
         return self.mu / 2 * (strain.shear + 2 * log_remainder(strain.j))
@@ -61,10 +64,10 @@ class _Compressible(_TwoConstants):
 
 
 class _Isochoric(_TwoConstants):
-    """W̃ = μ/2 (J^(−2/3) tr FᵀF − 3) = μ/2 J^(−2/3) (s − 3 ψ), and κ."""
+    """W̃ = μ/2 (J^(−2/3) tr FᵀF − 3), and κ."""
 
     def distortion(self, strain: Strain) -> Expr:
-        return self.mu / 2 * strain.J ** (-2.0 / 3.0) * (strain.shear - 3 * cube_root_remainder(strain.j))
+        return self.mu / 2 * strain.isochoric_I1
 
     @property
     def volumetric_modulus(self):

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from ufl import as_vector, dot
 
-from fenicsmech.errors import DescriptionError, set_fields
+from fenicsmech.errors import DescriptionError, point_text, set_fields
 from fenicsmech.laws.directed import Directed, Vector, unit
 
 
@@ -20,7 +20,8 @@ class Orthotropic(Directed):
         nu12, nu13, nu23: Poisson's ratios.
         G12, G13, G23: shear moduli, force per area.
         along, across: directions of the link as drawn, normal to each other, of two or three coordinates; kept as unit
-            vectors in space. In the plane one axis is z.
+            vectors in space. In the plane one axis is z. By default ``across`` is z × ``along`` in the plane, and
+            y where ``along`` is z.
 
     Raises:
         DescriptionError: a modulus is not positive, the constants are not positive definite, the directions have no
@@ -37,20 +38,31 @@ class Orthotropic(Directed):
     G13: float
     G23: float
     along: Vector = (1.0, 0.0, 0.0)
-    across: Vector = (0.0, 1.0, 0.0)
+    across: Vector = ()
 
     moduli = ("E1", "E2", "E3", "G12", "G13", "G23")
     directions = ("along", "across")
 
     def __post_init__(self) -> None:
         law = "law Orthotropic"
-        set_fields(self, along=unit(law, "along", self.along), across=unit(law, "across", self.across))
+        set_fields(self, along=unit(law, "along", self.along))
+        across = self.across if len(self.across) else self._across(law)
+        set_fields(self, across=unit(law, "across", across))
         cosine = sum(a * b for a, b in zip(self.along, self.across, strict=True))
         if abs(cosine) > 1e-9:
             problem = f"its directions {self.along} and {self.across} are not normal to each other"
             raise DescriptionError(law, problem, "Give across=(…) at a right angle to along=(…)")
         ratios = (("nu12", "E1", "E2"), ("nu13", "E1", "E3"), ("nu23", "E2", "E3"))
         self.check_constants(ratios)
+
+    def _across(self, law: str) -> Vector:
+        """The default of ``across``."""
+        x, y, z = self.along
+        if x == y == 0.0:
+            return 0.0, 1.0, 0.0
+        if z:
+            raise DescriptionError(law, f"along {point_text(self.along)} leaves the plane", "Give across=(…) too")
+        return 0.0 - y, x, 0.0
 
     @property
     def compliance(self):

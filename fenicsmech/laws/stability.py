@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from ufl import Identity, as_matrix, diff, dot
 
-from fenicsmech.laws.evaluation import Formulas, number
+from fenicsmech.laws.evaluation import Formulas, LawForm, number
 from fenicsmech.laws.law import Law
 from fenicsmech.laws.strain import spatial_strain
 
@@ -46,7 +46,7 @@ def drucker_stability(law: Law, F: NDArray[np.float64]) -> NDArray[np.float64]:
 def _stiffness(law: Law, F: NDArray[np.float64]) -> NDArray[np.float64]:
     """𝕔 (n, 6, 6) in the basis of unit tensors eᵢ ⊗ eᵢ and (eᵢ ⊗ eⱼ + eⱼ ⊗ eᵢ) / √2, by polarisation."""
     H = (F - np.eye(3)).reshape(len(F), 9).T
-    formulas, parameters = _formulas(type(law), _Shape(law)), tuple(law.parameters.values())
+    formulas, parameters = _formulas(LawForm(law)), tuple(law.parameters.values())
 
     def quadratic(D: NDArray) -> NDArray:
         return formulas(0.0, *D.ravel(), *H, *parameters)[0]
@@ -63,26 +63,13 @@ def _stiffness(law: Law, F: NDArray[np.float64]) -> NDArray[np.float64]:
     return found
 
 
-class _Shape:
-    """A law as a key: of its class and the number of its terms, not of its numbers."""
-
-    def __init__(self, law: Law) -> None:
-        self.law, self._names = law, tuple(law.parameters)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Shape) and self._names == other._names
-
-    def __hash__(self) -> int:
-        return hash(self._names)
-
-
 @lru_cache(maxsize=32)
-def _formulas(law: type[Law], shape: _Shape) -> Formulas:
+def _formulas(form: LawForm) -> Formulas:
     """d²W/dt² of t, D, H and the law's parameters."""
-    numbers, t = {name: number() for name in shape.law.parameters}, number()
+    numbers, t = {name: number() for name in form.law.parameters}, number()
     D, H = ([number() for _ in range(9)] for _ in range(2))
     step, gradient = (as_matrix([own[3 * k : 3 * k + 3] for k in range(3)]) for own in (D, H))
     # exp(t D) − 1 up to second order
     moved = t * step + t**2 / 2 * dot(step, step)
-    energy = shape.law.with_parameters(numbers).energy(spatial_strain(gradient + dot(moved, Identity(3) + gradient)))
+    energy = form.law.with_parameters(numbers).energy(spatial_strain(gradient + dot(moved, Identity(3) + gradient)))
     return Formulas([diff(diff(energy, t), t)], [t, *D, *H, *numbers.values()])

@@ -176,8 +176,7 @@ def _arguments(value: Any) -> dict[str, Any]:
     for name, parameter in _parameters(kind).items():
         if isinstance(value, Target) and name in ("equals", "at_most", "at_least", "least"):
             if value.relation == name.replace("_", " "):
-                wanted = value.wanted[0] if len(value.wanted) == 1 else value.wanted
-                found[name] = True if name == "least" else wanted
+                found[name] = True if name == "least" else value.wanted if value.vector else value.wanted[0]
             continue
         own = getattr(value, _ATTRIBUTES.get((kind, name), name))
         if (

@@ -8,11 +8,18 @@
 - ``scene``: effects, configurations, names of units, and checks of the whole
 """
 
-from fenicsmech.mechanism.cards import Figure, MaterialCard, Source, material, material_card, material_names
-from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import (
+from fenicsmech.mechanism.cards import (
     ONYX,
     SMOOTH_SIL_950,
+    Figure,
+    MaterialCard,
+    Source,
+    material,
+    material_card,
+    material_names,
+)
+from fenicsmech.mechanism.mechanism import Mechanism
+from fenicsmech.mechanism.parts import (
     Drive,
     FlexibleLink,
     Force,
@@ -28,7 +35,7 @@ from fenicsmech.mechanism.parts import (
     in_dimension,
     same_place,
 )
-from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, check_loads, validate
+from fenicsmech.mechanism.scene import DRAWN, Configuration, Effect, Scene, check_loads, check_units, validate
 from fenicsmech.mechanism.shapes import (
     Arc,
     Centreline,

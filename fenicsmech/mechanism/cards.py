@@ -32,12 +32,12 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fenicsmech.errors import DescriptionError, finite
+from fenicsmech.errors import DescriptionError, expect, finite
 from fenicsmech.laws import Law, NeoHookean, Yeoh
 from fenicsmech.mechanism.parts import Material
 from fenicsmech.mechanism.strength import Basquin, Strength
@@ -156,6 +156,7 @@ class MaterialCard:
 
     def material(self, *, units: Units = MILLIMETRES, nu: float | None = None, law: type[Law] = NeoHookean) -> Material:
         """The material of the card; as ``material``. *Local.*"""
+        expect(f"card {self.name!r}", units, Units, "a set of units", "Give units=Units(…)")
         density = self._si("density")
         return Material(
             self.name,
@@ -171,11 +172,11 @@ class MaterialCard:
         if law not in (NeoHookean, Yeoh):
             problem = f"it has no constants of {getattr(law, '__name__', repr(law))}"
             raise DescriptionError(part, problem, "Use law=NeoHookean or law=Yeoh, or fit a law by fit_law")
-        poisson = self._si("nu") if nu is None else nu
+        own = self._si("nu")
+        poisson = (INCOMPRESSIBLE if own == 0.5 else own) if nu is None else nu
         if poisson is None:
             remedy = f"Give one: material({self.name!r}, nu=…); strips that bend in plane stress hardly depend on it"
             raise DescriptionError(part, self._without("nu"), remedy)
-        poisson = INCOMPRESSIBLE if poisson == 0.5 else poisson
         first = "E" if law is NeoHookean else "yeoh_1"
         if (modulus := self._stress(first, units)) is None:
             remedy = "Make a Material(name, E, ν)" if first == "E" else "Use law=NeoHookean, or fit a law by fit_law"
@@ -215,7 +216,7 @@ def material(
     Args:
         name: that of a card of the package, or the path of a TOML file of your own, as ``cards`` describes it.
         units: those of the scene; mm, N and MPa unless given.
-        nu: Poisson's ratio, in place of that of the card.
+        nu: Poisson's ratio, in place of that of the card; the law has it as it is.
         law: ``NeoHookean``, with the modulus at small strain, or ``Yeoh``, with the constants of a card that has them;
             those of higher order that it leaves out are zero.
 
@@ -325,3 +326,13 @@ def _text(part: str, data: Mapping[str, Any], key: str) -> str:
     if not isinstance(text, str) or not text.strip():
         raise DescriptionError(part, f"its {key} is {text!r}", f'Give a text: {key} = "…"')
     return text
+
+
+ONYX = material(FOLDER / "onyx.toml")
+"""Carbon-filled nylon in mm, N and MPa, from its card; modulus fitted by the authors of the method (section VII-B)."""
+
+SMOOTH_SIL_950 = replace(material(FOLDER / "smooth-sil-950.toml"), density=1.24e-9)
+"""Platinum-cure silicone in mm, N and MPa, from its card; elastic constants used by the authors of the method.
+
+No source of its density could be read: its card leaves it out.
+"""

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TypeVar
 
-from fenicsmech.errors import DescriptionError, expect, finite, point, positive
+from fenicsmech.errors import DescriptionError, expect, finite, point, point_text, positive
 from fenicsmech.errors import direction as unit
 from fenicsmech.joints import CYLINDRICAL, PLANAR_JOINT, PRISMATIC, REVOLUTE, SPHERICAL, UNIVERSAL, WELD, JointKind
 from fenicsmech.mechanism.parts import (
@@ -180,6 +180,8 @@ class Mechanism:
         Raises:
             DescriptionError: as ``join``; the link is not a strip, or the clamp does not fit it.
         """
+        for link in (a, strip):
+            self._check_member(f"{name or 'clamp'!r}", link)
         part = f"{name or f'clamp {a.name}–{strip.name}'!r}"
         if not isinstance(strip, FlexibleLink) or not isinstance(strip.shape, Strip):
             remedy = "Use weld(…, at=…, region=Rectangle(…)) for other shapes"
@@ -193,6 +195,7 @@ class Mechanism:
         Raises:
             DescriptionError: the joint's kind takes no motor, it has one already, or it is not in the mechanism.
         """
+        expect(f"motor {name!r}" if name else "motor", joint, Joint, "a joint", "Give a joint of the mechanism")
         name = name or f"motor of {joint.name}"
         part = f"motor {name!r}"
         self._check_name(part, name, self.motors)
@@ -230,7 +233,8 @@ class Mechanism:
                 ``Rectangle`` about the point, through the depth of the link, or ``Face``. It moves with the link; where
                 its shape is designed, each part of the region keeps its share of the force. In half models it stands
                 for both halves.
-            name: for messages; unique.
+            name: for messages; unique. By default that of the link, with the place where the first one is taken, and
+                the direction where that is too.
 
         Raises:
             DescriptionError: the link is not in the mechanism, a number is invalid, the region is not a region or is
@@ -272,10 +276,14 @@ class Mechanism:
     ) -> Load:
         what = sort.__name__.lower()
         self._check_member(f"{name or what!r}", on)
-        name = name or f"{what} on {on.name}"
+        given, name = name, name or f"{what} on {on.name}"
+        place, along = point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction)
+        if given is None:
+            names = {load.name for load in taken}
+            further = f"{name} at {point_text(place)}"
+            name = next((own for own in (name, further) if own not in names), f"{further} along {point_text(along)}")
         self._check_name(f"{name!r}", name, taken)
-        region = _load_region(f"{name!r}", on, region)
-        load = sort(on, point(f"position of {name!r}", at), unit(f"direction of {name!r}", direction), name, region)
+        load = sort(on, place, along, name, _load_region(f"{name!r}", on, region))
         taken.append(load)
         return load
 

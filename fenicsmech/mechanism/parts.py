@@ -75,16 +75,6 @@ class Material:
         set_fields(self, name=name, law=law, density=density, expansion=expansion, strength=strength, units=units)
 
 
-ONYX = Material("Onyx", 1770.0, 0.42, density=1.2e-9)
-"""Carbon-filled nylon, MPa and t/mm³; modulus fitted by the authors of the method (section VII-B)."""
-
-SMOOTH_SIL_950 = Material("Smooth-Sil 950", 1.90, 0.475, density=1.24e-9)
-"""Platinum-cure silicone, MPa and t/mm³; elastic constants used by the authors of the method (section VII-B).
-
-No source of its density could be read: its card leaves it out.
-"""
-
-
 @dataclass(frozen=True)
 class RigidLink:
     """A link that does not deform.

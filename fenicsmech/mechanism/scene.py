@@ -12,13 +12,13 @@ not exist.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
 from fenicsmech.errors import DescriptionError, expect, set_fields
 from fenicsmech.mechanism.mechanism import Mechanism
-from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, Motor, RigidLink, read_pairs, same_place
+from fenicsmech.mechanism.parts import FlexibleLink, Joint, Link, Material, Motor, RigidLink, read_pairs, same_place
 from fenicsmech.mechanism.shapes import Region
 from fenicsmech.mechanism.units import MILLIMETRES, Units
 
@@ -135,7 +135,7 @@ class Scene:
 
     Raises:
         DescriptionError: ``mechanism`` is not a mechanism, something listed under ``effects`` is not an effect, or the
-            material of a link is in other units.
+            material of a link is in other units than ``units``.
     """
 
     mechanism: Mechanism
@@ -143,16 +143,14 @@ class Scene:
     units: Units = MILLIMETRES
 
     def __post_init__(self) -> None:
-        set_fields(self, effects=tuple(self.effects))
         expect("scene", self.mechanism, Mechanism, "a mechanism", "Pass a Mechanism")
+        expect("effects of a scene", self.effects, Iterable, "a list of effects", "Give effects=[Gravity(…), …]")
+        set_fields(self, effects=tuple(self.effects))
         for effect in self.effects:
             expect("scene", effect, Effect, "an effect", "List effects only, such as Gravity(…)")
+        expect("units of a scene", self.units, Units, "a set of units", "Give units=Units(…)")
         for link in self.mechanism.flexible_links:
-            own = link.material.units
-            if own not in (None, self.units):
-                problem = f"its material {link.material.name!r} is in {own}, the scene in {self.units}"
-                remedy = "Give units=… of the scene to material(…)"
-                raise DescriptionError(f"link {link.name!r}", problem, remedy)
+            check_units(f"link {link.name!r}", link.material, self.units)
 
     def __repr__(self) -> str:
         effects = "; ".join(effect.explain() for effect in self.effects)
@@ -170,6 +168,17 @@ class Scene:
                 problem = f"{motor.name!r} is not a motor of {self.mechanism.name!r}"
                 raise DescriptionError(f"configuration {name!r}", problem, "Add it with motor()")
         return made
+
+
+def check_units(part: str, material: Material, units: Units) -> None:
+    """Checks that the numbers of the material of a ``part`` are in the ``units`` of the scene, or in none.
+
+    Raises:
+        DescriptionError: they are in others.
+    """
+    if material.units not in (None, units):
+        problem = f"its material {material.name!r} is in {material.units}, the scene in {units}"
+        raise DescriptionError(part, problem, "Give units=… of the scene to material(…)")
 
 
 def validate(mechanism: Mechanism, dim: int) -> None:

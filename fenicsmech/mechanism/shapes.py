@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -52,7 +52,7 @@ class Face:
             (n, dim) → (n,) bool; a facet belongs to the part if it holds at all its corners.
 
     Raises:
-        DescriptionError: both are given.
+        DescriptionError: both are given, or one is something else.
     """
 
     within: Region | None = None
@@ -61,6 +61,8 @@ class Face:
     def __post_init__(self) -> None:
         if self.within is not None and self.where is not None:
             raise DescriptionError("face", "within and where are both given", "Give one of the two")
+        expect("face", self.where, Callable | None, "a predicate of points", "Give where=lambda x: …, (n, dim) → (n,)")
+        expect("face", self.within, Disc | Rectangle | None, "a region", "Give within=Disc(…) or Rectangle(…)")
 
 
 @dataclass(frozen=True)
@@ -142,11 +144,14 @@ def polygon(corners: Sequence[Sequence[float]], *, depth: float) -> Outline:
 def outline(start: Sequence[float], segments: Sequence[Line | Arc], *, depth: float) -> Outline:
     """The closed outline that runs from ``start`` along ``segments`` and back, extruded by ``depth``."""
     checked: list[Line | Arc] = []
+    expect("outline", segments, Iterable, "a list of segments", "Give [Line(…), Arc(…), …]")
     for segment in segments:
         expect("outline", segment, Line | Arc, "a segment", "Give Line(…) or Arc(…)")
         end = point("outline segment end", segment.end, dimensions=(2,))
         via = point("outline arc", segment.via, dimensions=(2,)) if isinstance(segment, Arc) else None
         checked.append(Line(end) if via is None else Arc(via, end))
+    if not checked:
+        raise DescriptionError("outline", "it has no segments", "Give those around the link: [Line(…), Arc(…), …]")
     return Outline(point("outline start", start, dimensions=(2,)), tuple(checked), positive("outline depth", depth))
 
 

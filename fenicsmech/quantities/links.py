@@ -123,19 +123,17 @@ class LinkMass(LinkVolume):
     def unit(self, units):
         return f"{units.force} s²/{units.length}"
 
-    def check(self, scene, dim):
-        super().check(scene, dim)
-        for link in self.chosen(scene.mechanism.flexible_links):
-            if self.density is None and link.material.density is None:
+    def check_materials(self, materials):
+        for link in self.chosen(list(materials)):
+            if self.density is None and materials[link].density is None:
                 raise DescriptionError(
                     self.name,
-                    f"the density of {link.material.name!r} is not known",
+                    f"the density of {materials[link].name!r} is not known",
                     "Give the material its density=…, or density=… here",
                 )
 
     def weights(self, model):
-        materials = [link.material for link in model.mechanism.flexible_links]
-        return super().weights(model) * [self.density or material.density or 0.0 for material in materials]
+        return super().weights(model) * [self.density or material.density or 0.0 for material in model.materials]
 
 
 class _Form(Observable):

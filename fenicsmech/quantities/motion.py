@@ -98,7 +98,7 @@ class Rotation(Quantity):
         about: axis in space; there it is the twist about this axis, within a full turn.
 
     Raises:
-        DescriptionError: a flexible link comes without a joint.
+        DescriptionError: the link or joint is something else, or a flexible link comes without a joint.
     """
 
     link: Link
@@ -108,6 +108,7 @@ class Rotation(Quantity):
 
     def __post_init__(self) -> None:
         expect("rotation", self.link, RigidLink | FlexibleLink, "a link", "Give a link")
+        expect(f"rotation of {self.link.name!r}", self.joint, Joint | None, "a joint", "Give a joint of the mechanism")
         if isinstance(self.link, FlexibleLink) and self.joint is None:
             raise DescriptionError(
                 f"rotation of {self.link.name!r}", "the link bends", "Give joint=…, at which it is to be known"

@@ -25,11 +25,12 @@ from mpi4py import MPI
 
 from fenicsmech.compat import assemble_vector, compile_form, owned_values
 from fenicsmech.equilibrium import EquilibriumSystem, State
-from fenicsmech.errors import DescriptionError, direction, in_plane, point_text, set_fields
+from fenicsmech.errors import DescriptionError, direction, expect, in_plane, point_text, set_fields
 from fenicsmech.mechanism import (
     FlexibleLink,
     Force,
     Joint,
+    Material,
     MaterialPoint,
     Motor,
     Output,
@@ -197,6 +198,13 @@ class Quantity(ABC):
                 if isinstance(part, Quantity):
                     part.check(scene, dim)
 
+    def check_materials(self, materials: Mapping[FlexibleLink, Material]) -> None:  # noqa: B027  # a hook
+        """Checks that the materials of all flexible links have what the quantity needs; by default they do.
+
+        Raises:
+            DescriptionError: they do not.
+        """
+
     def __str__(self) -> str:
         return self.name
 
@@ -224,6 +232,18 @@ class _OfVector(Quantity):
     def unit(self, units):
         return self.vector.unit(units)
 
+    def __post_init__(self) -> None:
+        expect(
+            type(self).__name__.lower(),
+            self.vector,
+            Quantity,
+            "a quantity",
+            "Give a vector, as Displacement(link, at=…)",
+        )
+
+    def check_materials(self, materials):
+        self.vector.check_materials(materials)
+
     def check(self, scene, dim):
         super().check(scene, dim)
         if self.vector.size(dim) == 1:
@@ -242,13 +262,14 @@ class Component(_OfVector):
         direction: any length; 2 or 3 coordinates.
 
     Raises:
-        DescriptionError: the direction has no length.
+        DescriptionError: this is not a quantity, or the direction has no length.
     """
 
     vector: Quantity
     direction: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         set_fields(self, direction=direction(f"direction of the {self.vector}", self.direction))
 
     @property
@@ -270,6 +291,9 @@ class Magnitude(_OfVector):
 
     Attributes:
         vector: the quantity.
+
+    Raises:
+        DescriptionError: this is not a quantity.
     """
 
     vector: Quantity

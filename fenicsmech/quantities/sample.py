@@ -50,8 +50,9 @@ class Sample:
     other forces act first.
 
     Args:
-        loads: magnitudes of forces; ``at(…)`` for one of them prescribes the displacement of its point instead; for
-            motors their positions, angle (rad) or length.
+        loads: magnitudes of forces, or of groups of forces, each of which gets its ratio times the magnitude; ``at(…)``
+            for one force prescribes the displacement of its point instead; for motors their positions, angle (rad) or
+            length.
         configuration: positions of the other motors.
 
     Attributes:
@@ -59,8 +60,8 @@ class Sample:
         configuration: positions of all motors.
 
     Raises:
-        DescriptionError: a part is neither a force nor a motor, a number is not finite, a motor is given twice, or two
-            displacements are prescribed.
+        DescriptionError: a part is neither a force nor a motor, a number is not finite, a force or motor is given
+            twice, two displacements are prescribed, or one of a group.
     """
 
     forces: tuple[tuple[Force, float | PrescribedDisplacement], ...]
@@ -68,15 +69,24 @@ class Sample:
 
     def __init__(
         self,
-        loads: Mapping[Force | Motor, float | PrescribedDisplacement] | None = None,
+        loads: Mapping[Force | ForceGroup | Motor, float | PrescribedDisplacement] | None = None,
         configuration: Configuration = DRAWN,
     ) -> None:
         forces: list[tuple[Force, float | PrescribedDisplacement]] = []
         positions: list[tuple[Motor, float]] = []
         expect("sample", configuration, Configuration, "a configuration", "Make one with scene.configuration()")
+        expect(
+            "sample", loads, Mapping | None, "a mapping of loads", "Give Sample({force: magnitude, motor: position})"
+        )
         for part, value in dict(loads or {}).items():
             if isinstance(part, Motor):
                 positions.append((part, finite(f"position of {part.name!r} in a sample", value)))
+            elif isinstance(part, ForceGroup):
+                if isinstance(value, PrescribedDisplacement):
+                    problem = f"the displacement of {part.name!r} is prescribed, a group of forces"
+                    raise DescriptionError("sample", problem, "Prescribe that of one force, or give a magnitude")
+                magnitude = finite(f"magnitude of {part.name!r} in a sample", value)
+                forces += [(force, ratio * magnitude) for force, ratio in part.ratios]
             elif not isinstance(part, Force):
                 raise DescriptionError(
                     "sample", f"{part!r} is neither a force nor a motor", "Give forces and motors of the mechanism"
@@ -85,6 +95,10 @@ class Sample:
                 forces.append((part, value))
             else:
                 forces.append((part, finite(f"force of a sample for {part.name!r}", value)))
+        acting = [force for force, _ in forces]
+        for force in acting:
+            if acting.count(force) > 1:
+                raise DescriptionError("sample", f"{force.name!r} is given twice", "Give each force once")
         given = dict(configuration.positions)
         for motor, _ in positions:
             if motor in given:

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Predictor
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, LoadControl, MotorControl, PointLoad
-from fenicsmech.errors import DescriptionError
+from fenicsmech.errors import DescriptionError, expect
 from fenicsmech.estimates import Estimates
 from fenicsmech.log import Clock
 from fenicsmech.mechanism import (
@@ -24,6 +24,7 @@ from fenicsmech.mechanism import (
     PrescribedPart,
     Scene,
     Shape,
+    check_units,
 )
 from fenicsmech.meshing import MechanismMesh
 from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
@@ -97,12 +98,9 @@ class Discretisation:
 
     def with_material(self, drawn: Material, other: Material) -> Discretisation:
         """The same scene on the same mesh, with links of another material instead of ``drawn``."""
-        if drawn not in self.materials:
-            raise DescriptionError(
-                f"material {drawn.name!r}",
-                f"no link of {self.scene.mechanism.name!r} is made of it",
-                f"Give one of {', '.join(sorted({repr(material.name) for material in self.materials}))}",
-            )
+        for given in (drawn, other):
+            expect("other material", given, Material, "a material", "Give with_material(drawn, other), two materials")
+        check_units(f"link {self._made_of(drawn).name!r}", other, self.scene.units)
         changed = copy(self)
         # with offsets of motors of its own
         changed.linkage = build_linkage(self.scene.mechanism, self.fidelity.model.mechanism_dim, self.moved)
@@ -111,6 +109,18 @@ class Discretisation:
         for name in ("model", "estimates", "stresses"):
             changed.__dict__.pop(name, None)
         return changed
+
+    def _made_of(self, material: Material) -> FlexibleLink:
+        """The first link of a material."""
+        links = self.scene.mechanism.flexible_links
+        for link, own in zip(links, self.materials, strict=True):
+            if own == material:
+                return link
+        raise DescriptionError(
+            f"material {material.name!r}",
+            f"no link of {self.scene.mechanism.name!r} is made of it",
+            f"Give one of {', '.join(sorted({repr(own.name) for own in self.materials}))}",
+        )
 
     @cached_property
     def mesh(self) -> MechanismMesh:
@@ -134,6 +144,7 @@ class Discretisation:
                 self.materials,
                 tuple(self.shapes.values()),
                 self.placed,
+                self._stress,
             )
 
     @cached_property
@@ -144,7 +155,7 @@ class Discretisation:
     @cached_property
     def stresses(self) -> StressRecovery:
         """Recovered stresses at equilibria."""
-        return StressRecovery(self.model, self._stress)
+        return StressRecovery(self.model)
 
     def solver(self, part: PrescribedPart, others: Sequence[Force] = ()) -> EquilibriumSolver:
         """The solver for a force or motors that change and some constant forces.

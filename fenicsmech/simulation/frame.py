@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from fenicsmech.model import Design, MechanismModel
 from fenicsmech.stress import (
     LawStability,
     Life,
+    Links,
     Safety,
     StressPeak,
     StressRecovery,
@@ -117,23 +118,23 @@ class Frame:
         """
         return {own.link: own for own in self.stresses.law_stabilities(self.state, self.design)}
 
-    def life(self, other: Frame, *, links: Sequence[str] | None = None) -> Life:
+    def life(self, other: Frame, *, links: Links | None = None) -> Life:
         """Cycles to failure between this frame and another one, by Basquin with Goodman's mean stress.
 
         Args:
             other: of the same simulation and design, on any of its curves.
-            links: names of the flexible links that count; all by default.
+            links: flexible links that count, one or several, or their names; by default all whose materials have an
+                ultimate stress and a line of Basquin or an endurance limit: ``Life.unknown`` names the others.
 
         Raises:
-            DescriptionError: the frames are of different simulations or designs, or a material lacks the ultimate
-                stress, or the line of Basquin where the stress is above its endurance limit.
+            DescriptionError: the frames are of different simulations or designs, no link is named, or a material lacks
+                the ultimate stress, or the line of Basquin where the stress is above its endurance limit.
         """
         expect("life", other, Frame, "a frame", "Give a frame of a curve of the same simulation")
         if other.stresses is not self.stresses:
             problem = "the frames belong to different simulations"
             raise DescriptionError("life", problem, "Take both from curves of one simulation")
-        chosen = None if links is None else tuple(links)
-        return life_between(self.stresses, (self.state, self.design), (other.state, other.design), chosen)
+        return life_between(self.stresses, (self.state, self.design), (other.state, other.design), links)
 
     @property
     def max_stress(self) -> float:

@@ -381,7 +381,8 @@ class Simulation:
             other: their new material; effects keep the drawn one, such as its density in ``Gravity``.
 
         Raises:
-            DescriptionError: no link is made of ``drawn``, or no fidelity was chosen for an accuracy yet.
+            DescriptionError: no link is made of ``drawn``, ``other`` is not a material in the units of the scene, or no
+                fidelity was chosen for an accuracy yet.
         """
         simulation = self._derived()
         simulation._discretisation = self._discretisation.with_material(drawn, other)

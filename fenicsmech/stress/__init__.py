@@ -19,7 +19,7 @@ from fenicsmech.stress.extremes import LargestStrain, LargestStress, LeastLife, 
 from fenicsmech.stress.fields import StressField
 from fenicsmech.stress.interpolation import InterpolationOptions
 from fenicsmech.stress.law_stability import LawStability
-from fenicsmech.stress.life import Life, LinkLife, life_between
+from fenicsmech.stress.life import Life, LinkLife, Links, life_between
 from fenicsmech.stress.peak import StressRecovery
 from fenicsmech.stress.recovered import Recovered, von_mises
 from fenicsmech.stress.recovery import RecoveryOptions

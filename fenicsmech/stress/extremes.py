@@ -22,7 +22,7 @@ stress constraints (doi:10.1002/(SICI)1097-0207(19981230)43:8<1453::AID-NME480>3
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial, reduce
 from typing import TypeVar
@@ -35,7 +35,7 @@ from fenicsmech.collective import from_one, on_one
 from fenicsmech.compat import cell_dofs, cell_nodes, compile_expression, evaluate_expression, quadrature_space
 from fenicsmech.equilibrium import State
 from fenicsmech.errors import DescriptionError, expect, finite, positive, set_fields
-from fenicsmech.mechanism import Allowable, Material, Scene
+from fenicsmech.mechanism import Allowable, FlexibleLink, Material
 from fenicsmech.model import MechanismModel
 from fenicsmech.quantities import FormValue, Observable, OfLinks, Partial, Sample
 from fenicsmech.stress.drawn import FittedStress, SurfaceFit
@@ -130,12 +130,15 @@ class _Smooth:
         cls, fields: FittedStress, links: np.ndarray, kept: np.ndarray, measure: Measure, sharpness: float
     ) -> _Smooth:
         """That of the points in a mask ``kept`` (facets, p)."""
-        v = np.where(kept, measure.values(fields, links), 0.0)
-        largest = max(float(v.max()), 1e-300)
-        norm = largest * float(((v / largest) ** sharpness).sum()) ** (1.0 / sharpness)
-        # ∂‖v‖/∂v = (v / ‖v‖)^(p − 1)
-        shares = (v / norm) ** (sharpness - 1.0)
-        shares[shares < _LEAST_SHARE * shares.max()] = 0.0
+        v = np.where(kept, np.maximum(measure.values(fields, links), 0.0), 0.0)
+        largest = float(v.max())
+        if largest > 0.0:
+            norm = largest * float(((v / largest) ** sharpness).sum()) ** (1.0 / sharpness)
+            # ∂‖v‖/∂v = (v / ‖v‖)^(p − 1)
+            shares = (v / norm) ** (sharpness - 1.0)
+            shares[shares < _LEAST_SHARE * shares.max()] = 0.0
+        else:
+            norm, shares = 0.0, np.zeros_like(v)  # all strains are compressive: v has no slope at its end
         value, slope = measure.total(norm)
         return cls(value, fields, links, measure, slope * shares)
 
@@ -221,7 +224,7 @@ class _Extreme(Observable):
                 present = [own for own in fields if own is not None]
                 counts = surface.kept & self._chosen[surface.links][:, None]
                 found = measured(surface.links, *(surface.recovered(own) for own in present))
-                values = np.where(counts, found, -np.inf)
+                values = np.where(counts, np.maximum(found, 0.0), -np.inf)
                 facet, point = (int(k) for k in np.unravel_index(np.argmax(values), values.shape))
                 error = surface.error(present, facet, point, partial(measured, surface.links[[facet]]))
                 return self._measure.total(float(values[facet, point]) + self._margin * error)[0]
@@ -273,17 +276,20 @@ class _ExtremeOfLinks(OfLinks):
         links: a flexible link or several; all of them by default.
         sharpness: p of the smooth maximum that optimisers see (``fenicsmech.stress.extremes``).
         margin: times that the estimated error of recovery counts, on the safe side; 0 for the recovered value itself.
-        options: of the recovery; give those of the simulation where it has some.
+        options: of the recovery; None: those of the simulation.
     """
 
     sharpness: float = SHARPNESS
     margin: float = MARGIN
-    options: StressOptions = StressOptions()
+    options: StressOptions | None = None
     smoothed = True
     resolution = 1.5e-3  # peaks are known to 1 to 3 %
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        expect(
+            f"options of the {self.name}", self.options, StressOptions | None, "StressOptions", "Give StressOptions(…)"
+        )
         margin = finite(f"margin of the {self.name}", self.margin)
         if margin < 0.0:
             raise DescriptionError(f"margin of the {self.name}", f"it is {margin:g}", "Give 0 or more")
@@ -308,7 +314,7 @@ class LargestStress(_ExtremeOfLinks):
         links: a flexible link or several; all of them by default.
         sharpness: p of the smooth maximum that optimisers see (``fenicsmech.stress.extremes``).
         margin: times that the estimated error is added, on the safe side; 0 for the recovered value itself.
-        options: of the recovery; give those of the simulation where it has some.
+        options: of the recovery; None: those of the simulation.
 
     Raises:
         DescriptionError: they are not flexible links, the sharpness is not positive, or the margin is negative.
@@ -326,6 +332,8 @@ class LargestStress(_ExtremeOfLinks):
 @dataclass(frozen=True)
 class LargestStrain(_ExtremeOfLinks):
     """The largest principal nominal strain λ₁ − 1 of the elastic deformation at the surface of flexible links.
+
+    It is 0 where every strain is compressive, as in a pressed strip whose Poisson's ratio is negative.
 
     Attributes:
         links, sharpness, margin, options: as those of ``LargestStress``.
@@ -362,10 +370,9 @@ class LeastSafety(_ExtremeOfLinks):
     def unit(self, units):
         return ""
 
-    def check(self, scene, dim):
-        super().check(scene, dim)
+    def check_materials(self, materials):
         remedy = "Give Material(…, strength=Strength(yield_stress=…)), or use fm.material(…) of a card that has one"
-        _check_known(self, scene, _allowable, "allowable stress or strain", remedy)
+        _check_known(self, materials, _allowable, "allowable stress or strain", remedy)
 
     def weights(self, model):
         return super().weights(model) * [_allowable(material) is not None for material in model.materials]
@@ -414,11 +421,10 @@ class LeastLife(_ExtremeOfLinks):
     def unit(self, units):
         return "decades"
 
-    def check(self, scene, dim):
-        super().check(scene, dim)
+    def check_materials(self, materials):
         _check_known(
             self,
-            scene,
+            materials,
             _fatigue,
             "ultimate stress and line of Basquin",
             "Give Material(…, strength=Strength(ultimate_stress=…, fatigue=Basquin(σ_f′, b)))",
@@ -445,10 +451,14 @@ def _fatigue(material: Material) -> tuple[float, float, float] | None:
 
 
 def _check_known(
-    quantity: OfLinks, scene: Scene, known: Callable[[Material], object], missing: str, remedy: str
+    quantity: OfLinks,
+    materials: Mapping[FlexibleLink, Material],
+    known: Callable[[Material], object],
+    missing: str,
+    remedy: str,
 ) -> None:
     """Raises a DescriptionError if materials of links that were named, or of all links, are not ``known``."""
-    lacking = [link for link in quantity.chosen(scene.mechanism.flexible_links) if known(link.material) is None]
-    if lacking and (quantity.links is not None or len(lacking) == len(scene.mechanism.flexible_links)):
-        names = " and ".join(dict.fromkeys(repr(link.material.name) for link in lacking))
+    lacking = [link for link in quantity.chosen(list(materials)) if known(materials[link]) is None]
+    if lacking and (quantity.links is not None or len(lacking) == len(materials)):
+        names = " and ".join(dict.fromkeys(repr(materials[link].name) for link in lacking))
         raise DescriptionError(quantity.name, f"material {names} has no {missing}", remedy)

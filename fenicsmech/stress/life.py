@@ -12,7 +12,7 @@ Source: N. E. Dowling, Mechanical Behavior of Materials, section 9.8 (Sines 1955
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,11 +20,14 @@ import numpy as np
 from fenicsmech.collective import from_one
 from fenicsmech.equilibrium import State
 from fenicsmech.errors import DescriptionError, point_text
-from fenicsmech.mechanism import Material
+from fenicsmech.mechanism import FlexibleLink, Material
 from fenicsmech.model import Design
 from fenicsmech.stress.peak import StressRecovery
 from fenicsmech.stress.recovered import von_mises
 from fenicsmech.stress.surface import SurfaceStress
+
+Links = str | FlexibleLink | Sequence[str | FlexibleLink]
+"""Flexible links, or their names."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +63,11 @@ class Life:
 
     Attributes:
         links: lives of the links, the shortest first.
+        unknown: names of the flexible links that are left out, as the fatigue of their materials is not known.
     """
 
     links: tuple[LinkLife, ...]
+    unknown: tuple[str, ...] = ()
 
     @property
     def least(self) -> LinkLife:
@@ -85,19 +90,21 @@ class Life:
         return self.least.place
 
     def __str__(self) -> str:
-        return f"life {self.least}"
+        unknown = f"; not known of {', '.join(self.unknown)}" if self.unknown else ""
+        return f"life {self.least}{unknown}"
 
 
 def life_between(
-    stresses: StressRecovery, first: tuple[State, Design], second: tuple[State, Design], links: tuple[str, ...] | None
+    stresses: StressRecovery, first: tuple[State, Design], second: tuple[State, Design], links: Links | None
 ) -> Life:
     """The life under cycles between two equilibria, see ``Frame.life``."""
     materials = dict(stresses.materials)
-    for name in links or ():
-        if name not in materials:
-            raise DescriptionError("life", f"{name!r} is not a flexible link", f"Choose from {', '.join(materials)}")
-    chosen = {name: own for name, own in materials.items() if links is None or name in links}
+    names = None if links is None else _names(links, materials)
+    chosen = {name: own for name, own in materials.items() if names is None or name in names}
+    if names is None and (known := {name: own for name, own in chosen.items() if not _missing(own)}):
+        chosen = known
     _check_data(chosen)
+    unknown = tuple(name for name in materials if names is None and name not in chosen)
     one, other = stresses.surface_stress(*first), stresses.surface_stress(*second)
 
     def find() -> Life:
@@ -110,7 +117,7 @@ def life_between(
             for name, own in chosen.items()
             if (one.links == numbers[name]).any()
         ]
-        return Life(tuple(sorted(found, key=lambda own: (own.cycles, -own.reversed_amplitude))))
+        return Life(tuple(sorted(found, key=lambda own: (own.cycles, -own.reversed_amplitude))), unknown)
 
     return from_one(stresses.comm, find)
 
@@ -135,10 +142,27 @@ def _life(name: str, material: Material, one: SurfaceStress, other: SurfaceStres
     return LinkLife(name, cycles, float(amplitude[k]), float(mean[k]), float(worst[k]), place)
 
 
+def _names(links: Links, materials: Mapping[str, Material]) -> tuple[str, ...]:
+    """Names of flexible links, given by themselves or by name."""
+    given = (links,) if isinstance(links, str | FlexibleLink) else tuple(links)
+    names = tuple(link.name if isinstance(link, FlexibleLink) else link for link in given)
+    choice = f"Choose from {', '.join(materials)}"
+    if not names:
+        raise DescriptionError("life", "no link is named", choice)
+    for name in names:
+        if name not in materials:
+            raise DescriptionError("life", f"{name!r} is not a flexible link", choice)
+    return names
+
+
+def _missing(material: Material) -> str:
+    """What the life of a material needs and is not known; empty if nothing."""
+    return "strength" if material.strength is None else material.strength.missing_for_life
+
+
 def _check_data(materials: Mapping[str, Material]) -> None:
     """Raises a DescriptionError unless all data are known, naming the material."""
     for name, material in materials.items():
-        missing = "strength" if material.strength is None else material.strength.missing_for_life
-        if missing:
+        if missing := _missing(material):
             remedy = "Give Strength(ultimate_stress=…, fatigue=Basquin(σ_f′, b)), or name other links with links=[…]"
             raise DescriptionError(f"life of {name!r}", f"material {material.name!r} has no {missing}", remedy)

@@ -34,11 +34,11 @@ class StressRecovery:
 
     Args:
         model: the mechanism.
-        options: of the recovery.
+        options: of the recovery; None: those of the simulation that the model belongs to.
     """
 
     def __init__(self, model: MechanismModel, options: StressOptions | None = None) -> None:
-        self._model, self._options = model, options or StressOptions()
+        self._model, self._options = model, options or model.stress_options or StressOptions()
 
     def peaks(self, state: State, design: Design) -> SurfacePeaks:
         """The peaks of the von Mises stress at an equilibrium."""

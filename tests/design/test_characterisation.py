@@ -48,6 +48,13 @@ def test_modulus_of_exact_data_is_found_again():
     assert fit.curves[0].displacements == pytest.approx(exact(), rel=1e-6)
 
 
+def test_measurements_of_something_else_are_refused():
+    simulation, _ = bench(GUESS)
+    for given, problem in (((simulation, "push"), "'push' is not a force"), ((3, None), "3 is not a simulation")):
+        with pytest.raises(DescriptionError, match=problem):
+            Experiment(*given, FORCES, FORCES)
+
+
 def test_a_fit_leaves_simulations_and_their_curves_as_they_are():
     simulation, push = bench(GUESS)
     before = simulation.load_displacement(push, forces=FORCES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -207,6 +208,11 @@ def test_invalid_bounds(bounds, problem):
     with pytest.raises(fm.DescriptionError, match=problem) as caught:
         fm.SplineDesign(link, 3, **bounds)
     assert "'diagonal'" in caught.value.part
+
+
+def test_bounds_of_thickness_are_any_pair():
+    link = truss().designs[0].link
+    assert fm.SplineDesign(link, 3, thickness=np.array([1, 6])) == fm.SplineDesign(link, 3, thickness=(1.0, 6.0))
 
 
 def test_a_configuration_that_does_not_assemble():

@@ -133,6 +133,29 @@ def test_remarks_tell_what_the_tests_do_not_cover():
     assert float(remark.split("stretch ")[1].split()[0]) == pytest.approx(peak, abs=0.2)
 
 
+def test_laws_without_a_ratio_of_poisson_hold_nothing_by_default():
+    fibres = fm.TransverselyIsotropic(30.0, 2.0, 0.3, 0.3, 0.9)
+    stretches = np.linspace(1.01, 1.2, 20)
+    pull = fm.SpecimenTest("uniaxial", stretches, fm.specimen_stress(fibres, "uniaxial", stretches))
+    others = tuple(name for name in fibres.constants if name != "E_along")
+    fit = fm.fit_law(replace(fibres, E_along=20.0), pull, held=others, options=ONE)
+    assert fit.values == pytest.approx({"E_along": 30.0}, rel=1e-6)
+    with pytest.raises(fm.FenicsmechError) as caught:  # one test does not determine all of them
+        fm.fit_law(replace(fibres, E_along=20.0), pull, options=replace(ONE, evaluations=20))
+    assert "held" not in str(caught.value)
+    hooke = fm.NeoHookean(2.0, 0.4)
+    stresses = fm.specimen_stress(hooke, "uniaxial", stretches)
+    test = fm.SpecimenTest("uniaxial", stretches, stresses)
+    for held in (None, "nu", ["nu"]):
+        assert fm.fit_law(fm.NeoHookean(1.0, 0.4), test, held=held, options=ONE).values == pytest.approx({"E": 2.0})
+
+
+def test_a_search_that_does_not_end_is_no_fit():
+    few = fm.LawFitOptions(starts=2, evaluations=1)
+    with pytest.raises(fm.EquilibriumError, match="not at a minimum after 1 evaluation.*evaluations="):
+        fm.fit_law(fm.Yeoh(0.9, -0.01, 0.001, 0.49), TRELOAR, options=few)
+
+
 def test_tests_are_read_from_files(tmp_path):
     path = tmp_path / "pull.csv"
     path.write_text("time [s],Strain [%],Stress [MPa]\n0,0,0\n1,50,0.4\n2,100,0.7\n")

@@ -115,6 +115,26 @@ def test_a_bistable_mechanism_is_fitted_through_its_snap():
     assert fm.fit_modulus([through], guess).youngs_modulus == pytest.approx(fit.values[guess]["E"], rel=1e-6)
 
 
+def test_push_and_pull_are_two_runs_from_zero():
+    case = four_bar()
+    displacements = np.array([-0.1, 0.2, -0.4, 1.6, 0.0]) * RISE  # beyond the snap and back
+    runs = [
+        case.simulation.load_displacement(case.push, displacements=own)
+        for own in (displacements[[1, 3]], displacements[[0, 2]])
+    ]
+    forces = np.zeros(5)
+    forces[[1, 3]], forces[[0, 2]] = runs[0].forces, runs[1].forces
+    read = fm.Experiment(case.simulation, case.push, forces, displacements, unknown=fm.Unknown.FORCE)
+    assert [[own.prescribed / RISE for own in run.controls] for run in read.requests] == [
+        pytest.approx([0.0, 0.2, 1.6]),
+        pytest.approx([-0.1, -0.4]),
+    ]
+    fit = fm.fit_modulus([read], PLASTIC)
+    assert fit.youngs_modulus == pytest.approx(PLASTIC.law.E, rel=1e-6)
+    assert [len(curve.frames) for curve in fit.curves] == [3, 2]
+    assert fit.residuals[0] == pytest.approx(np.zeros(5), abs=1e-6 * np.abs(forces).max())
+
+
 def test_readings_of_large_error_hardly_count():
     forces, errors = pulled(), np.ones(len(DISPLACEMENTS))
     forces[2], errors[2] = 2.0 * forces[2], 1e4

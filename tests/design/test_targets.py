@@ -196,6 +196,47 @@ def test_comparison_makes_residuals_bounds_and_objective_of_values():
         assert slopes @ step == pytest.approx(function(values + rows @ step) - function(values), rel=1e-9, abs=1e-12)
 
 
+def test_bounds_are_measured_by_themselves_and_equalities_by_others_of_their_kind():
+    push, sample = arm().push, fm.Sample({arm().push: 1.0})
+    along = fm.Component(fm.Displacement(arm().hand, at=(60, 0)), (1, 0))
+    targets = [
+        fm.Target(fm.LargestStrain(), sample, at_most=0.02),
+        fm.Target(fm.LeastSafety(), sample, at_least=1.5),
+        fm.Target(fm.Displacement(push), sample, equals=5.0),
+        fm.Target(along, sample, equals=0.1),  # of the kind of the one before
+        fm.Target(fm.CentrelineLength(arm().link), equals=0.1),  # of another kind, in the same unit
+        fm.Target(along, sample, at_most=0.1),
+        fm.Target(along, sample, at_least=0.0),
+    ]
+    compared = Comparison(targets, fm.Units())
+    assert compared.scales == pytest.approx([0.02, 1.5, 5.0, 0.5, 0.1, 0.1, 0.5])
+    assert compared.errors(np.array([0.0214, 1.5, 5.0, 0.1, 0.1, 0.1, 0.0]))[0] == pytest.approx(0.07)
+    for relation in ({"at_least": 0.0}, {"equals": 0.0}):
+        with pytest.raises(fm.DescriptionError, match="zero is wanted.*scale="):
+            Comparison([fm.Target(along, sample, **relation), targets[4]], fm.Units())
+
+
+def test_wanted_components_may_be_an_array_or_the_first_of_a_vector():
+    place, sample = fm.Displacement(arm().hand, at=(60, 0)), fm.Sample({arm().push: 1.0})
+    assert fm.Target(place, sample, equals=np.array([1.0, 2.0])) == fm.Target(place, sample, equals=(1.0, 2.0))
+    first = fm.Target(place, sample, equals=(1.0,))
+    first.check(arm().scene, 2)
+    assert first.size == 1
+    assert fm.Target(fm.Displacement(arm().push), sample, equals=np.float64(2.0)).wanted == (2.0,)
+    known = every().equilibria
+    along = SampleEquilibria(every().simulation, [fm.Target(place, arm().both, equals=(1.0,))])
+    assert along.values(along.from_zero()) == pytest.approx(known.values(known.from_zero())[:1], rel=1e-7)
+
+
+def test_a_group_of_forces_in_a_sample_is_its_forces():
+    own = arm()
+    pair = fm.ForceGroup("pair", {own.push: 1.0, own.pull: -0.5})
+    assert fm.Sample({pair: 4.0}) == fm.Sample({own.push: 4.0, own.pull: -2.0})
+    for loads, problem in (({pair: 1.0, own.push: 1.0}, "'push' is given twice"), ({pair: fm.at(1.0)}, "a group")):
+        with pytest.raises(fm.DescriptionError, match=problem):
+            fm.Sample(loads)
+
+
 def test_invalid_targets_are_refused():
     push, energy, sample = arm().push, fm.StrainEnergy(), fm.Sample({arm().push: 1.0})
     upward = fm.Component(fm.JointForce(arm().clamp), (0, 0, 1))
@@ -207,8 +248,21 @@ def test_invalid_targets_are_refused():
         (lambda: fm.Target(push, sample, equals=1.0), "not a quantity", "Displacement"),
         (lambda: fm.Target(energy, sample, equals=1.0, force=1.0), "belong in its sample", "Sample"),
         (lambda: fm.Target(energy, sample, equals="much"), "not a number", "finite"),
+        (lambda: fm.Target(energy, sample, equals=[]), "is empty", "each component"),
+        (lambda: fm.Target(energy, sample, at_most=1.0, weight=2.0), "weighs a bound", "scale"),
+        (lambda: fm.Target(push), "it is not given", "Sample"),
+        (lambda: fm.Target(push, force=1.0), "it is not given", "Sample"),
+        (
+            lambda: fm.Target(fm.JointForce(arm().clamp), sample, least=True).check(arm().scene, 2),
+            "only a number can be least",
+            "Magnitude",
+        ),
         (lambda: fm.Target(energy, sample, equals=1.0, scale=0.0), "not positive", "greater"),
         (lambda: fm.Sample({push: fm.at(1.0), arm().pull: fm.at(2.0)}), "two displacements", "at"),
+        (lambda: fm.Sample(push), "not a mapping", "Sample"),
+        (lambda: fm.limits(energy, 3.0, at_most=1.0), "not a list of samples", "targets"),
+        (lambda: fm.Target(fm.Magnitude(push), sample, equals=1.0), "not a quantity", "vector"),
+        (lambda: fm.Rotation(arm().link, joint="wrist"), "not a joint", "mechanism"),
         (lambda: fm.Sample({arm().link: 1.0}), "neither a force nor a motor", "mechanism"),
         (lambda: fm.Sample({arm().motor: 0.1}, fm.Sample({arm().motor: 0.2}).configuration), "two positions", "one"),
         (lambda: fm.Sample({push: 1.0}, "closed"), "not a configuration", "scene"),
@@ -235,6 +289,7 @@ def test_one_limit_over_samples_is_a_target_at_each_of_them_once():
     stress = fm.LargestStress()
     found = fm.limits(stress, [own.both, own.moved, own.both], at_most=30.0)
     assert found == tuple(fm.Target(stress, sample, at_most=30.0) for sample in (own.both, own.moved))
+    assert fm.limits(stress, own.both, at_most=30.0) == found[:1]
     everywhere = fm.limits(stress, own.every(), at_most=30.0)
     assert [target.sample for target in everywhere] == [own.both, own.moved, own.bent]
     # of a cycle to all others

@@ -210,6 +210,15 @@ def test_an_axis_that_leaves_the_plane_is_refused():
         fm.Simulation(fm.Scene(beam), space="plane-stress", size=4.0).load_displacement(pull, forces=[0.1])
 
 
+def test_the_second_axis_follows_from_the_first_in_the_plane():
+    numbers = [getattr(plies(), name) for name in fm.Orthotropic.__dataclass_fields__][:9]
+    turned, root = fm.Orthotropic(*numbers, along=(1.0, 1.0)), 0.5**0.5
+    assert np.array(turned.axes) == pytest.approx(np.array([[root, root, 0], [-root, root, 0], [0, 0, 1]]))
+    assert fm.Orthotropic(*numbers).across == fm.Orthotropic(*numbers, along=(0, 0, 1)).across == (0.0, 1.0, 0.0)
+    with pytest.raises(fm.DescriptionError, match="leaves the plane.*across"):
+        fm.Orthotropic(*numbers, along=(1.0, 0.0, 1.0))
+
+
 @pytest.mark.parametrize(
     ("change", "problem"),
     [

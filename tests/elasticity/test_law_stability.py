@@ -79,6 +79,13 @@ def test_any_number_of_ranks_finds_the_same_stability():
     assert (together.link, together.law) == (alone.link, alone.law)
 
 
+def test_auxetic_laws_are_not_taken_for_stable():
+    law = fm.NeoHookean(1.0, -0.3)
+    assert drucker_stability(law, np.diag([2.0, 1.0, 1.0])[None])[0] < 0.0
+    assert not law.stable and not fm.LogarithmicNeoHookean(1.0, -0.1).stable
+    assert fm.NeoHookean(1.0, 0.0).stable and fm.IsochoricSimoNeoHookean(1.0, -0.3).stable
+
+
 def test_explanations_warn_where_a_law_is_used_beyond_its_stability():
     curve = strip_under_tension(YEOH, 0.1)
     near = curve.frames[-1].law_stability["strip"]

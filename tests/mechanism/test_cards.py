@@ -127,8 +127,12 @@ def test_lines_of_basquin_are_read_from_the_material():
 
 def test_cards_agree_with_the_materials_of_the_method():
     onyx, silicone = fm.material("Onyx"), fm.material("Smooth-Sil 950")
-    assert (onyx.law, onyx.density) == (fm.ONYX.law, fm.ONYX.density)
-    assert silicone.law == fm.SMOOTH_SIL_950.law
+    assert onyx == fm.ONYX and replace(silicone, density=1.24e-9) == fm.SMOOTH_SIL_950
+    # to the last digit, as examples were computed with them
+    assert (fm.ONYX.law, fm.ONYX.density) == (fm.NeoHookean(1770.0, 0.42), 1.2e-9)
+    assert fm.SMOOTH_SIL_950.law == fm.NeoHookean(1.9, 0.475)
+    with pytest.raises(fm.DescriptionError, match="ν|nu|ratio is 0.5"):
+        fm.material("Onyx", nu=0.5)
 
 
 def test_moduli_of_the_wire_are_those_of_an_isotropic_material():
@@ -204,6 +208,9 @@ def test_a_scene_refuses_materials_in_other_units():
     with pytest.raises(fm.DescriptionError, match=r"link 'strip'.*'POM Hostaform C 9021' is in m, N, Pa.*mm, N, MPa"):
         fm.Scene(beam)
     assert fm.Scene(beam, units=METRES).units == METRES
+    beam.flexible("rod", fm.strip([(0, 9), (60, 9)], thickness=3.0, depth=10.0), fm.ONYX)
+    with pytest.raises(fm.DescriptionError, match="link 'rod'.*'Onyx' is in mm, N, MPa, the scene in m, N, Pa"):
+        fm.Scene(beam, units=METRES)
 
 
 def test_an_unknown_name_lists_those_known():

@@ -5,7 +5,20 @@ import pytest
 from fenicsmech.errors import DescriptionError
 from fenicsmech.joints import SPHERICAL
 from fenicsmech.laws import NeoHookean
-from fenicsmech.mechanism import ONYX, Configuration, Disc, Material, Mechanism, Rectangle, RigidLink, Scene, strip
+from fenicsmech.mechanism import (
+    ONYX,
+    Configuration,
+    Disc,
+    Face,
+    Material,
+    Mechanism,
+    Rectangle,
+    RigidLink,
+    Scene,
+    material,
+    outline,
+    strip,
+)
 
 from .parts import assert_refused, parts
 
@@ -31,17 +44,18 @@ def test_name_that_is_taken_is_refused(part, name, action):
 
 
 @pytest.mark.parametrize("kind", ["force", "output"])
-def test_second_load_of_a_name_is_refused(kind):
+def test_loads_without_a_name_differ_by_their_place_and_direction(kind):
     p = parts()
     add = getattr(p.mechanism, kind)
-    add(on=p.crank, at=(0.0, 0.0), direction=(1.0, 0.0))
+    loads = [((0.0, 0.0), (1.0, 0.0)), ((5.0, 0.0), (1.0, 0.0)), ((5.0, 0.0), (0.0, 1.0))]
+    names = [add(on=p.crank, at=at, direction=direction).name for at, direction in loads]
     name = f"{kind} on crank"
-    assert_refused(
-        lambda: add(on=p.crank, at=(5.0, 0.0), direction=(1.0, 0.0)),
-        f"{name!r}",
-        f"the name {name!r} is taken",
-        OWN_NAME,
-    )
+    assert names == [name, f"{name} at (5, 0)", f"{name} at (5, 0) along (0, 1)"]
+    taken = names[-1]
+    refusal = f"{taken!r}", f"the name {taken!r} is taken", OWN_NAME
+    assert_refused(lambda: add(on=p.crank, at=(5.0, 0.0), direction=(0.0, 1.0)), *refusal)
+    refusal = f"{name!r}", f"the name {name!r} is taken", OWN_NAME
+    assert_refused(lambda: add(on=p.crank, at=(5.0, 0.0), direction=(1.0, 0.0), name=name), *refusal)
 
 
 def test_joints_between_the_same_links_differ_by_their_place():
@@ -68,6 +82,24 @@ def test_joint_of_a_link_with_itself_is_refused():
         "link 'crank' is joined with itself",
         "Name two different links",
     )
+
+
+@pytest.mark.parametrize(
+    ("action", "problem"),
+    [
+        (lambda p: p.mechanism.motor("shaft"), "'shaft' is not a joint"),
+        (lambda p: p.mechanism.clamp("base", p.rod, end="end", length=2.0), "'base' is not a link of 'press'"),
+        (lambda p: p.mechanism.clamp(p.base, "rod", end="end", length=2.0), "'rod' is not a link of 'press'"),
+        (lambda p: Scene(p.mechanism, effects=Disc(1.0)), "is not a list of effects"),
+        (lambda p: Scene(p.mechanism, units="mm"), "'mm' is not a set of units"),
+        (lambda p: material("Onyx", units="mm"), "'mm' is not a set of units"),
+        (lambda p: Face(where=3), "3 is not a predicate"),
+        (lambda p: outline((0.0, 0.0), [], depth=1.0), "it has no segments"),
+    ],
+)
+def test_parts_of_another_type_are_refused(action, problem):
+    with pytest.raises(DescriptionError, match=problem):
+        action(parts())
 
 
 def test_joint_kind_of_another_type_is_refused():

@@ -142,10 +142,12 @@ def test_curve_is_drawn_and_tabulated(shared_tmp_path):
 
 
 def test_labels_name_the_units_of_the_scene(shared_tmp_path):
-    scene, grasp = describe("claw")
-    scene = fm.Scene(scene.mechanism, units=fm.Units(length="in", force="lbf", stress="psi"))
-    simulation = fm.Simulation(scene, space="plane-stress", order=1, size=6.0, comm=COMM)
-    simulation.load_displacement(grasp, forces=[1.0]).write_csv(shared_tmp_path / "curve.csv")
+    units, beam = fm.Units(length="in", force="lbf", stress="psi"), fm.Mechanism("beam")
+    ground, shape = beam.rigid("ground", fixed=True), fm.strip([(0, 0), (4, 0)], thickness=0.5, depth=0.5)
+    beam.clamp(ground, strip := beam.flexible("strip", shape, fm.material("POM", units=units)), end="start", length=0.5)
+    push = beam.force(on=strip, at=(4, 0), direction=(0, 1), region=fm.Disc(0.3))
+    simulation = fm.Simulation(fm.Scene(beam, units=units), space="plane-stress", order=1, size=0.5, comm=COMM)
+    simulation.load_displacement(push, forces=[1.0]).write_csv(shared_tmp_path / "curve.csv")
     COMM.Barrier()
     header = (shared_tmp_path / "curve.csv").read_text().splitlines()[0]
     assert all(label in header for label in ("displacement [in]", "force [lbf]", "[lbf in]", "[psi]"))

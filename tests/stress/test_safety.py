@@ -103,6 +103,19 @@ def test_life_of_a_bar_between_two_forces():
     assert low.life(low).cycles == math.inf
 
 
+def test_lives_leave_out_links_whose_fatigue_is_not_known():
+    simulation, _, along = beam(second=fm.Material("soft", 1e5, 0.3))
+    bar, other = simulation.scene.mechanism.flexible_links
+    low, high = simulation.load_displacement(along, forces=[1.0, 5.0]).frames
+    life = low.life(high)
+    assert (life.link, life.unknown) == ("bar", ("other",)) and str(life).endswith("; not known of other")
+    for links in (bar, [bar], "bar", ["bar"]):
+        assert low.life(high, links=links).links == life.links
+    for links, problem in (([], "no link is named"), ([3], "3 is not a flexible"), (other, "'soft' has no strength")):
+        with pytest.raises(fm.DescriptionError, match=problem):
+            low.life(high, links=links)
+
+
 def test_turning_as_a_rigid_body_is_no_cycle():
     mechanism = fm.Mechanism("pendulum")
     base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
