@@ -73,6 +73,7 @@ lint: install-test ## style, types and layering: seconds
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -p no:cacheprovider --durations=5 --durations-min=5
 SERIAL = $(PYTEST) -n 2 --dist worksteal --ignore tests/test_layering.py
 TESTS := tests
+RANK_TESTS = $(TESTS)
 
 test-serial: install-test ## the fast tests on one process each
 	$(call heading,tests on one process)
@@ -80,7 +81,7 @@ test-serial: install-test ## the fast tests on one process each
 
 test-parallel: install-test ## the fast tests marked `parallel`, on two MPI ranks
 	$(call heading,tests on $(RANKS) ranks)
-	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and not thorough and $(SELECT)" $(TESTS)
+	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and not thorough and $(SELECT)" $(RANK_TESTS)
 
 test-thorough: install-test ## those marked `thorough`, on ranks if they are `parallel` too
 	$(call heading,thorough tests)
@@ -108,8 +109,8 @@ effectivity: install-test ## error estimates of 300 random scenes from seed 1600
 	$(call heading,effectivity of error estimates)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes.effectivity --write
 
-# What can differ between versions of dolfinx, PETSc, gmsh and Python, on one process; FULL=yes runs everything that is
-# fast, on ranks too, which may not come to an end on Debian 13: one rank waits in PetscFinalize when the other has left.
+# What can differ between versions of dolfinx, PETSc, gmsh, MPI and Python, little of it on ranks; FULL=yes runs
+# everything that is fast.
 FULL :=
 VERSION_TESTS := tests/meshing $(patsubst %,tests/elasticity/test_%.py,body carried derivatives mixed_derivatives patch) \
     $(patsubst %,tests/mechanism/test_%.py,cards purity) tests/joints/test_kinds.py tests/multibody/test_invariance.py \
@@ -118,9 +119,13 @@ VERSION_TESTS := tests/meshing $(patsubst %,tests/elasticity/test_%.py,body carr
     tests/effects/test_contact_derivatives.py \
     $(patsubst %,tests/equilibrium/test_%.py,blocks factor lagrangian mixed_lagrangian newton two_level) \
     $(patsubst %,tests/continuation/test_%.py,eigen load_steps) \
-    $(patsubst %,tests/simulation/test_%.py,files memory ranks units)
+    $(patsubst %,tests/simulation/test_%.py,files units)
+VERSION_RANK_TESTS := $(patsubst %,tests/test_%.py,collective compat) tests/simulation/test_files.py \
+    $(patsubst %,tests/simulation/test_ranks.py::test_%,claw link_that_cannot_be_meshed_is_refused_on_all_ranks \
+    one_rank_decides_on_motions_and_ranks_of_constraints)
 OTHER_SUITE = tools/debian.sh $(1) make --no-print-directory INSTALL= PYTHON=/usr/bin/python3 \
-    SELECT="$(SELECT) and not calculix" $(if $(FULL),,TESTS="$(VERSION_TESTS)") test-serial $(if $(FULL),test-parallel)
+    SELECT="$(SELECT) and not calculix" $(if $(FULL),,TESTS="$(VERSION_TESTS)" \
+    RANK_TESTS="$(VERSION_RANK_TESTS)") test-serial test-parallel
 
 test-debian13: install-test ## the tests of what versions change in a Debian 13 root (built once, about two minutes)
 	$(call heading,tests in Debian 13)

@@ -44,10 +44,7 @@ _LEGACY = _VERSION < (0, 6)
 if not _LEGACY:
     import basix.ufl
 
-# Marks communicators whose duplicate is kept in the list while the process lives. An attribute would hold the duplicate
-# itself, but is deleted too late for PETSc to free it.
-_KEPT = MPI.Comm.Create_keyval()
-_DUPLICATES: list[PETSc.Comm] = []
+_KEPT = MPI.Comm.Create_keyval()  # marks communicators whose duplicate is kept
 
 _ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
 
@@ -332,11 +329,14 @@ def destroy_garbage(comm: MPI.Comm) -> None:
 
     Call it before the first such object is made. PETSc works on a duplicate of ``comm``, which it makes collectively if
     there is none and frees with the last object on it. Processes drop that object at different times, or never where a
-    traceback holds it; one would then make a duplicate while another does not. So the first duplicate is kept.
+    traceback holds it; one would then make a duplicate while another does not. So the first duplicate is kept, even
+    when Python ends: PetscFinalize destroys garbage where a process has a duplicate of the world, and would wait for a
+    process that has none.
     """
     if comm.Get_attr(_KEPT) is None:
         comm.Set_attr(_KEPT, True)
-        _DUPLICATES.append(PETSc.Comm(comm).duplicate())
+        duplicate = PETSc.Comm(comm).duplicate()
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(duplicate))  # never deleted; PetscFinalize frees that of the world
     PETSc.garbage_cleanup(comm)
 
 
