@@ -15,6 +15,8 @@ import logging
 import math
 import os
 import platform
+import signal
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import cache
@@ -338,6 +340,16 @@ def destroy_garbage(comm: MPI.Comm) -> None:
         duplicate = PETSc.Comm(comm).duplicate()
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(duplicate))  # never deleted; PetscFinalize frees that of the world
     PETSc.garbage_cleanup(comm)
+
+
+def ignore_broken_pipes() -> None:
+    """Undoes what PETSc does with SIGPIPE, which writing to a process or a page that has just gone raises.
+
+    PETSc ends the program there, and crashes while it reports that. Python ignores the signal and raises
+    ``BrokenPipeError``. Without effect outside the main thread.
+    """
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def write_series(path, mesh: dmesh.Mesh, functions: Mapping[str, fem.Function], steps, update, comm: MPI.Comm) -> None:

@@ -25,6 +25,16 @@ async def events(process: asyncio.subprocess.Process) -> AsyncIterator[dict[str,
             process.kill()
 
 
+async def ended(process: asyncio.subprocess.Process) -> int:
+    """How a process ended; what was written to it as it went is given up."""
+    assert process.stdin is not None, "it is a pipe"
+    code = await process.wait()
+    process.stdin.close()
+    with suppress(ConnectionError):
+        await process.stdin.wait_closed()
+    return code
+
+
 class Job:
     """One process at a time.
 
@@ -102,12 +112,12 @@ class Job:
                 process.stdin.write(json.dumps(task).encode())
                 await process.stdin.drain()
             process.stdin.close()
-            ended = False
+            complete = False
             async for event in events(process):
-                ended = event["state"] in ("solved", "failed")
+                complete = event["state"] in ("solved", "failed")
                 self.tell(event)
-            return None if ended else f"its process ended with {await process.wait()}"
+            return None if complete else f"its process ended with {await ended(process)}"
         finally:
             if process.returncode is None:
                 process.kill()
-                await process.wait()
+            await ended(process)

@@ -23,9 +23,10 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+from fenicsmech.compat import ignore_broken_pipes
 from fenicsmech.errors import DescriptionError
 from fenicsmech.live.build import constants
-from fenicsmech.live.job import Job, events
+from fenicsmech.live.job import Job, ended, events
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
 from fenicsmech.live.problems import too_long
 from fenicsmech.live.project import LARGEST_PROJECT, MOST_ADDED, Project, example_names, materials
@@ -137,6 +138,7 @@ class Server:
 
     async def start(self) -> None:
         """Starts the solver, and listens."""
+        ignore_broken_pipes()  # pages and solvers go at any time
         web = _aiohttp().web
         await self._solver.start()
         if self._opened is not None:
@@ -544,7 +546,7 @@ class SolverProcess:
             self._waiting.cancel()
         if process is not None and process.returncode is None:
             process.kill()
-            await process.wait()
+            await ended(process)
 
     def _urge(self) -> None:
         """Ends a process that has not begun its last task."""
@@ -607,7 +609,7 @@ class SolverProcess:
             _log.exception("an event of the solver process is not as it should be")
             with suppress(ProcessLookupError):
                 process.kill()
-        await process.wait()
+        await ended(process)
         if process is not self._process or self._stopped:
             return
         _log.warning("the solver process ended with %s", process.returncode)

@@ -245,18 +245,3 @@ def test_a_link_without_a_centreline():
 def test_surrogates_that_are_none(given):
     problem = truss(*REACHABLE).problem(space="3d")
     refused(lambda: problem.optimise(surrogate=given), part="surrogate", problem=str(given), remedy="plane-stress")
-
-
-def test_links_whose_files_would_have_one_name():
-    mechanism = fm.Mechanism("stool")
-    ground, seat = mechanism.rigid("ground", fixed=True), mechanism.rigid("seat")
-    legs = []
-    for x, name in ((0, "leg 1"), (20, "leg-1")):
-        legs.append(mechanism.flexible(name, fm.strip([(x, 0), (x, 30)], thickness=2.0, depth=5.0), fm.ONYX))
-        for link, y in ((ground, 0), (seat, 30)):
-            mechanism.revolute(link, legs[-1], at=(x, y), interface_radius=2.0)
-    push = mechanism.force(on=seat, at=(10, 30), direction=(0, -1))
-    case = Case(
-        fm.Scene(mechanism), [fm.SplineDesign(leg, 1) for leg in legs], [fm.Target(push, force=1, displacement=1)]
-    )
-    refused(lambda: case.problem(), part="design problem", problem="'leg 1' and 'leg-1'", remedy="Rename")

@@ -466,6 +466,7 @@ def test_a_script_serves_its_problem_here_alone_under_a_token_until_it_is_interr
         try:
             address = process.stdout.readline().split()[-1]
             host, token = re.fullmatch(r"http://([^:]+):\d+/([\w-]{32})/", address).groups()
+            process.send_signal(signal.SIGPIPE)  # as what is written to a page that has gone
             with urllib.request.urlopen(address) as page:
                 assert host == "127.0.0.1" and page.status == 200
             with urllib.request.urlopen(address + "export/project") as found:
