@@ -142,12 +142,14 @@ class _Looked:
         found: recovered at the points of the surface.
         measure: of recovered fields, (k, p).
         sampled: its largest sample in each cell of the mesh, (cells,).
+        others: measures with at most the same relative error.
     """
 
     fields: CellFields
     found: Recovered
     measure: Callable[[Recovered], np.ndarray]
     sampled: np.ndarray
+    others: tuple[Callable[[Recovered], np.ndarray], ...] = ()
 
 
 class LinkSurface:
@@ -487,22 +489,25 @@ class LinkSurface:
         """The peaks of the von Mises stress at an equilibrium."""
         # in fits to both sides of a corner the stress vanishes there: samples tell
         stresses = fields.samples[..., :9].reshape(*fields.samples.shape[:2], 3, 3)
-        return self._peaks(fields, Recovered.von_mises, von_mises(stresses).max(axis=1))
+        sampled = von_mises(stresses).max(axis=1)
+        return self._peaks(_Looked(fields, self.recovered(fields), Recovered.von_mises, sampled))
 
     def strain_peaks(self, fields: CellFields) -> SurfacePeaks:
-        """The peaks of the largest principal strain, from fields with the elastic part of F."""
+        """The peaks of the largest principal strain, from fields with the elastic part of F.
+
+        The law makes one of strain and stress: the fit that sees more of its error speaks for both.
+        """
         dim, samples = self._model.elastic.model.dim, fields.samples
         free = self._flexible[: len(samples)]
         elastic = samples[free][..., 9 + dim**2 :]
         sampled = np.zeros(len(samples))
         sampled[free] = principal_strain(elastic.reshape(*elastic.shape[:2], dim, dim)).max(axis=1)
-        return self._peaks(fields, Recovered.principal_strain, sampled)
+        found, others = self.recovered(fields), (Recovered.von_mises,)
+        return self._peaks(_Looked(fields, found, Recovered.principal_strain, sampled, others))
 
-    def _peaks(
-        self, fields: CellFields, measure: Callable[[Recovered], np.ndarray], sampled: np.ndarray
-    ) -> SurfacePeaks:
-        """Those of a measure, whose largest sample in each cell is ``sampled``."""
-        looked, links = _Looked(fields, self.recovered(fields), measure, sampled), self.links
+    def _peaks(self, looked: _Looked) -> SurfacePeaks:
+        """Those of all links, and of each."""
+        links = self.links
         own = tuple(self._peak(looked, links == number) for number in np.unique(links))
         return SurfacePeaks(self._peak(looked, np.ones(len(links), dtype=bool)), own)
 
@@ -524,6 +529,10 @@ class LinkSurface:
         ]
         link = links[self._link[self._meshed.cells[facet]]]
         error = self.error([looked.fields], facet, point, looked.measure)
+        for other in looked.others:
+            stress = float(other(looked.found)[facet, point])
+            if stress > 0.0:
+                error = max(error, abs(value) / stress * self.error([looked.fields], facet, point, other))
         place = tuple(looked.found.points[facet, point].tolist())
         return StressPeak(value, error, place, link.name, tuple(above))
 

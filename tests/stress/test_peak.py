@@ -64,7 +64,7 @@ def test_peaks_are_those_of_closed_forms_or_fine_elements(case, share):
     beside = case.name == "cantilever" and share < 1.0
     strain, expected = frame.strain_peak, case.strain(known.value)
     assert strain.value == pytest.approx(expected, rel=0.012 if beside else 0.01)
-    assert beside or estimated_well(strain, expected)
+    assert estimated_well(strain, expected)
 
 
 @pytest.mark.slow
