@@ -35,7 +35,7 @@ def reference(name: str, space: str, size: float) -> float:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("order", "size"), [(1, 1.0), (2, 4.0), (2, 2.0), (2, 1.5)])
-@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
+@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw"])
 def test_effectivity_in_the_plane_is_between_a_half_and_two(name, order, size, monkeypatch):
     value, estimate = estimated(name, "plane-stress", order, size)
     refine(monkeypatch, 2 if size > 2.0 else 1)
@@ -44,7 +44,7 @@ def test_effectivity_in_the_plane_is_between_a_half_and_two(name, order, size, m
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw", "klann"])
+@pytest.mark.parametrize("name", ["cantilever", "arch", "truss", "claw"])
 def test_effectivity_of_forces_at_prescribed_displacements_is_between_a_half_and_two(name, monkeypatch):
     scene, push, load = case(name)
     simulation = fm.Simulation(scene, space="plane-stress", size=2.0)
@@ -105,15 +105,7 @@ def test_curve_file_names_what_the_errors_are_of(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "size"),
-    [
-        ("cantilever", 3.0),
-        ("cantilever", 2.0),
-        ("arch", 3.0),
-        ("arch", 2.0),
-        ("truss", 3.0),
-        ("claw", 3.0),
-        ("klann", 3.0),
-    ],
+    [("cantilever", 3.0), ("cantilever", 2.0), ("arch", 3.0), ("arch", 2.0), ("truss", 3.0), ("claw", 3.0)],
 )
 def test_effectivity_in_space_is_between_a_half_and_two(name, size):
     value, estimate = estimated(name, "3d", 2, size)
