@@ -12,6 +12,7 @@ from typing import Any
 from fenicsmech.live.problems import too_long
 
 _LONGEST = 2**27  # bytes of an event
+_CLOSING = 1.0  # s, in which the pipe to a process that has ended closes
 
 
 async def events(process: asyncio.subprocess.Process) -> AsyncIterator[dict[str, Any]]:
@@ -30,8 +31,10 @@ async def ended(process: asyncio.subprocess.Process) -> int:
     assert process.stdin is not None, "it is a pipe"
     code = await process.wait()
     process.stdin.close()
-    with suppress(ConnectionError):
-        await process.stdin.wait_closed()
+    closed = asyncio.ensure_future(process.stdin.wait_closed())
+    await asyncio.wait([closed], timeout=_CLOSING)
+    if not closed.cancel():
+        closed.exception()  # a broken pipe
     return code
 
 

@@ -156,7 +156,7 @@ class Server:
         app.router.add_static(f"/{self.token}/page/", PAGE)
         self._runner = runner = web.AppRunner(app, access_log=None)
         await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", self._options.port).start()
+        await web.TCPSite(runner, "127.0.0.1", self._options.port, shutdown_timeout=1.0).start()
         self.port = runner.addresses[0][1]
         self.address = f"http://127.0.0.1:{self.port}/{self.token}/"
         await self._ask(self.session.task)
