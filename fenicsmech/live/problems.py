@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from fenicsmech.design import DesignResult
+from fenicsmech.equilibrium import Unknown
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.simulation import Curve
 
 _SNAPPED = "Make the largest force smaller to stay before the snap, or let the links be thicker"
-_UNSTABLE = "Make the largest force smaller: what is dashed stays only where something holds its displacement"
+_UNSTABLE = "What is dashed stays only where something holds its displacement"
 _MISSED = "Relax a target, widen the thicknesses, or move a joint"
 _MET = 0.01  # relative error of a target
 
@@ -29,7 +30,8 @@ def too_long(seconds: float) -> dict[str, str]:
 
 def remarks(curve: Curve) -> list[str]:
     """The remarks of a curve, a sentence each with its remedy."""
-    remedies = [_SNAPPED] * sum(frame.snapped_through for frame in curve.frames) + [_UNSTABLE]
+    dashed = _UNSTABLE if curve.unknown is Unknown.FORCE else f"Make the largest force smaller. {_UNSTABLE}"
+    remedies = [_SNAPPED] * sum(frame.snapped_through for frame in curve.frames) + [dashed]
     return [f"{own}. {remedy}." for own, remedy in zip(curve.remarks, remedies, strict=False)]
 
 
