@@ -103,12 +103,10 @@ def truss_alone(tmp_path_factory) -> tuple[dict, str, Path]:
     return *report("truss", folder, *QUICK), folder
 
 
-@pytest.mark.parametrize(
-    "space", [pytest.param("plane-stress", marks=pytest.mark.thorough), pytest.param("3d", marks=pytest.mark.slow)]
-)
-def test_truss_reaches_its_targets_with_a_tapered_diagonal_from_a_step_file(space, tmp_path):
+@pytest.mark.thorough
+def test_truss_reaches_its_targets_with_a_tapered_diagonal_from_a_step_file(tmp_path):
     part = str(ROOT / "meshes" / "diagonal.step")
-    summary, _ = report("truss", tmp_path, "--quick", "--space", space, "--part", part)
+    summary, _ = report("truss", tmp_path, *QUICK, "--part", part)
     check_design(summary, tmp_path, THICKNESS["truss"])
     assert summary["parameters"] == PARAMETERS["truss"]
     for target in summary["targets"]:
