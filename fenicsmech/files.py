@@ -75,8 +75,6 @@ def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO]:
 
 def _synchronise(folder: Path) -> None:
     """Writes the names of a folder's files to the disk, where the system can."""
-    if os.name != "posix":
-        return
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with suppress(OSError):  # some file systems of networks refuse it

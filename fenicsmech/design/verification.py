@@ -72,11 +72,9 @@ def part_simulations(
                     f"{effect.explain()}: its predicate is one of drawn points, which the design moves",
                     "Describe the part in a scene of its own, with fm.step_file(…) and a predicate of its points",
                 )
-    on_one(simulation.comm, lambda: _write(folder, links, meshes, depths))
-    files = solid_files(links)
-    shapes = {
-        link: step_file(folder / f"{files[link]}.step", depth=depth) for link, depth in zip(links, depths, strict=True)
-    }
+    paths = {link: folder / f"{name}.step" for link, name in solid_files(links).items()}
+    on_one(simulation.comm, lambda: _write(paths, meshes, depths))
+    shapes = {link: step_file(path, depth=depth) for (link, path), depth in zip(paths.items(), depths, strict=True)}
     halved = _halved(simulation, targets)
     coarse, fine = (
         simulation.with_shapes(shapes, fidelity=_finer(simulation, factor, halved), moved=moved, placed=placed)
@@ -99,10 +97,9 @@ def placed_points(
     return {point: simulation.model.placed_point(point) for point in dict.fromkeys(points) if point[0] in links}
 
 
-def _write(folder: Path, links: Sequence[FlexibleLink], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
-    files = solid_files(links)
-    for link, mesh, depth in zip(links, meshes, depths, strict=True):
-        write_step(folder / f"{files[link]}.step", mesh, depth=depth, name=link.name)
+def _write(paths: Mapping[FlexibleLink, Path], meshes: Sequence[LinkMesh], depths: Sequence[float]) -> None:
+    for (link, path), mesh, depth in zip(paths.items(), meshes, depths, strict=True):
+        write_step(path, mesh, depth=depth, name=link.name)
 
 
 def _halved(simulation: Simulation, targets: Sequence[Target]) -> bool:

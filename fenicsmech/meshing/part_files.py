@@ -36,8 +36,8 @@ def _(shape: MeshPart, request: MeshRequest) -> None:
 
 def _check_file(shape: StepPart | MeshPart, part: str) -> None:
     """Refuses a file that does not begin as its kind does; gmsh would guess its kind."""
-    step = isinstance(shape, StepPart)
-    path, header, kind = shape.path, *(("ISO-10303-21", "STEP file") if step else ("$MeshFormat", "gmsh mesh file"))
+    header, kind = ("ISO-10303-21", "STEP file") if isinstance(shape, StepPart) else ("$MeshFormat", "gmsh mesh file")
+    path = shape.path
     try:
         with open(path, "rb") as file:
             start = file.read(len(header) + 64).lstrip()
