@@ -130,7 +130,6 @@ class Server:
         self._opened = None if self.session.task["fit"] else self.session.project  # whose results may be stored
         self._state: dict[str, Any] = {"event": "solver", "state": "starting"}
         self._drawn: Mapping[str, Any] | None = None  # the last final curve
-        self._firsts: dict[int, dict[int, dict[str, Any]]] = {}  # curves of each project as it was opened
         self._pushing: Outbox | None = None  # the page of the last push
         self._editing: Outbox | None = None  # the page of the last edit that was not settled
         self._runner: Any = None
@@ -358,7 +357,7 @@ class Server:
         if event["event"] != "errors" or self._drawn is None or self._drawn["curve"] != event["curve"]:
             return
         number, project = event["curve"], self.session.project
-        first = self._firsts.setdefault(self.session.opened, {})
+        first = self.session.first_curves
         if number not in first and self.session.untouched:
             own = project["curves"][number]
             first[number] = {
@@ -405,7 +404,7 @@ class Server:
         }
 
     def _first_event(self) -> dict[str, Any]:
-        return {"event": "first", "curves": list(self._firsts.get(self.session.opened, {}).values())}
+        return {"event": "first", "curves": list(self.session.first_curves.values())}
 
     def _tell(self, event: Mapping[str, Any]) -> None:
         self._send(json.dumps(event))

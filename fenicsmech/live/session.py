@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from fenicsmech.live.project import Project, edited, example, example_names, read_project, wants
@@ -29,10 +29,11 @@ class Answer:
 
 @dataclass(frozen=True)
 class _Opened:
-    """A project as it was opened, and how many were before."""
+    """A project as it was opened, which one it is, from 1, and its curves by number, as far as they are solved."""
 
     project: Project
     number: int
+    curves: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 
 class Session:
@@ -61,6 +62,11 @@ class Session:
     def opened(self) -> int:
         """Which of the projects that were opened the present one is made of, from 1."""
         return self._opened.number
+
+    @property
+    def first_curves(self) -> dict[int, dict[str, Any]]:
+        """Curves of the project as it was opened, by number, to be noted here; they last as long as the history."""
+        return self._opened.curves
 
     @property
     def can_undo(self) -> bool:
