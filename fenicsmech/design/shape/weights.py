@@ -15,9 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.sparse import coo_matrix, csr_matrix, diags, identity, kron
+from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags
+from scipy.sparse.linalg import splu
 
 from fenicsmech.design.shape.handles import BETWEEN, LinkHandles
+from fenicsmech.equilibrium import Factor
 from fenicsmech.errors import FenicsmechError
 from fenicsmech.meshing import FREE, CurvedEdges, LinkMesh, cell_measures, plan_of
 
@@ -38,9 +40,7 @@ def handle_weights(mesh: LinkMesh, handles: LinkHandles, *, part: str = "link") 
     Q, free = _energy(expanded), holder == BETWEEN
     weights = (holder[:, None] == np.arange(len(handles))).astype(float)
     weights[free] = solve_partition(Q[free][:, free], Q[free][:, ~free] @ weights[~free], part=part)
-    # the solver keeps to bounds and sum up to its tolerance
-    weights = np.maximum(weights, 0.0)
-    weights /= weights.sum(axis=1, keepdims=True)
+    weights /= weights.sum(axis=1, keepdims=True)  # rounding
     return weights[plan.column]
 
 
@@ -166,71 +166,77 @@ def stiffness(mesh: LinkMesh, *, axis: int | None = None) -> csr_matrix:
     return csr_matrix(coo_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count)))
 
 
+_PATIENCE = 5  # whole exchanges in a row that leave no fewer violations than the best so far
+
+
 def solve_partition(
-    Q: csr_matrix, c: np.ndarray, *, part: str, penalty: float = 3.0, tolerance: float = 1e-9, rounds: int = 100
+    Q: csr_matrix, c: np.ndarray, *, part: str, tolerance: float = 1e-10, rounds: int = 1000
 ) -> np.ndarray:
-    """The bounded weights that sum to one and minimise a quadratic energy, by PETSc/TAO, (n, k).
+    """The bounded weights that sum to one and minimise a quadratic energy, by block principal pivoting, (n, k).
 
-        min  Σ_j ½ w_jᵀ Q w_j + c_jᵀ w_j   over w ≥ 0 with Σ_j w_j = 1
+        min  Σ_j ½ w_jᵀ Q w_j + c_jᵀ w_j   over w ≥ 0 with Σ_j w_j = 1,
+        Q w_j + c_j + λ = μ_j,     w ≥ 0,  μ ≥ 0,  w μ = 0
 
-    by the method of multipliers: the trust-region Newton method TRON minimises, within the bounds,
-
-        Σ_j (½ w_jᵀ Q w_j + c_jᵀ w_j) + λᵀ s + κ/2 sᵀ D s,     s = Σ_j w_j − 1,  D = diag Q,
-
-    and then λ ← λ + κ D s. Every round shrinks s by a factor that does not depend on the mesh.
+    With w = 0 outside a set of free weights and μ = 0 inside, one linear system gives w and λ. Free weights below zero
+    and others of negative μ change sides, all at once, until there are none. Where their number does not fall, one
+    changes at a time, which ends (J. J. Júdice, F. M. Pires: A block principal pivoting algorithm for large-scale
+    strictly monotone linear complementarity problems, doi:10.1016/0305-0548(94)90106-6).
 
     Args:
         Q: symmetric positive definite, (n, n), sparse.
         c: linear terms, (n, k).
         part: what the weights belong to, for messages.
-        penalty: κ; larger ones save rounds, but their minimisations take longer.
-        tolerance: largest |s| accepted; TRON minimises a hundred times closer.
-        rounds: maximum number of updates of λ.
+        tolerance: −w, and −μ over the diagonal of Q, that count as zero.
+        rounds: maximum number of exchanges.
 
     Raises:
-        FenicsmechError: the multipliers did not converge.
+        FenicsmechError: weights keep changing sides.
     """
-    n, k = c.shape
-    scale = Q.diagonal().mean()
-    Q, c = Q / scale, c / scale
-    stiff = penalty * Q.diagonal()
-    # unknowns weight by weight, vertex by vertex: w_11, w_12, …, w_1k, w_21, …
-    hessian = csr_matrix(kron(Q, identity(k)) + kron(diags(stiff), np.ones((k, k))))
-    hessian.sort_indices()
-    H = PETSc.Mat().createAIJ(hessian.shape, csr=(hessian.indptr, hessian.indices, hessian.data), comm=PETSc.COMM_SELF)
-    linear = H.createVecRight()
-
-    def objective(tao: PETSc.TAO, w: PETSc.Vec, gradient: PETSc.Vec) -> float:
-        H.mult(w, gradient)
-        value = 0.5 * w.dot(gradient) + linear.dot(w)
-        gradient.axpy(1.0, linear)
-        return value
-
-    w, lower, upper, slope = (H.createVecRight() for _ in range(4))
-    w.set(1.0 / k)
-    upper.set(PETSc.INFINITY)
-    tao = PETSc.TAO().create(PETSc.COMM_SELF)
-    tao.setType(PETSc.TAO.Type.TRON)
-    tao.setObjectiveGradient(objective, slope)
-    tao.setHessian(lambda *_: None, H)
-    tao.setVariableBounds((lower, upper))
-    tao.setTolerances(gatol=1e-2 * tolerance, grtol=0.0, gttol=0.0)
-    tao.getKSP().getPC().setType(PETSc.PC.Type.ICC)
-    tao.setSolution(w)
-
-    multipliers = np.zeros(n)
-    try:
-        for _ in range(rounds):
-            linear.array[:] = (c + (multipliers - stiff)[:, None]).ravel()
-            tao.solve()
-            excess = w.array.reshape(n, k).sum(axis=1) - 1.0
-            multipliers += stiff * excess
-            if np.abs(excess).max() < tolerance:
-                return w.array.reshape(n, k).copy()
-    finally:
-        # at once: PETSc does not free objects held by the callbacks of a solver that was queued
-        for thing in (tao, w, lower, upper, slope, linear, H):
-            thing.destroy()
+    stiff, least, patience = Q.diagonal()[:, None], c.size + 1, _PATIENCE
+    w = splu(csc_matrix(Q), permc_spec="MMD_AT_PLUS_A").solve(-c)  # without bounds; weights of handles sum to one so
+    free = w > tolerance
+    for _ in range(rounds):
+        empty = ~free.any(axis=1)
+        free[empty, w[empty].argmax(axis=1)] = True  # one at least carries the sum
+        w, mu = _with_free(Q, c, free)
+        violated = np.where(free, w < -tolerance, mu < -tolerance * stiff)
+        count = np.count_nonzero(violated)
+        if count == 0:
+            return np.maximum(w, 0.0)
+        least, patience = (count, _PATIENCE) if count < least else (least, patience - 1)
+        if patience < 0:
+            violated.ravel()[: np.flatnonzero(violated)[-1]] = False
+        free ^= violated
     raise FenicsmechError(
-        part, f"the weights of its handles add up to 1 ± {np.abs(excess).max():.1e} only", "Use fewer handles"
+        part, f"the weights of its handles have not been found: {count} of {w.size} keep changing", "Use fewer handles"
     )
+
+
+def _with_free(Q: csr_matrix, c: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """w and μ if only some weights are ``free`` of zero, (n, k): K w + Eᵀ λ = −c, E w = 1 over these."""
+    vertex, number = np.nonzero(free)[0], np.full(free.shape, -1)
+    number[free] = np.arange(len(vertex))
+    entries = Q.tocoo()
+    row, column = number[entries.row], number[entries.col]
+    both = (row >= 0) & (column >= 0)
+    values = np.broadcast_to(entries.data[:, None], both.shape)[both]
+    K = csr_matrix((values, (row[both], column[both])), shape=(len(vertex), len(vertex)))
+    E = csr_matrix((np.ones(len(vertex)), (vertex, np.arange(len(vertex)))), shape=(len(free), len(vertex)))
+    stiffest = np.abs(entries.data).max()
+    kkt = csr_matrix(bmat([[K / stiffest, E.T], [E, None]]))
+    kkt.sort_indices()
+    structure = (part.astype(PETSc.IntType) for part in (kkt.indptr, kkt.indices))
+    matrix = PETSc.Mat().createAIJ(kkt.shape, csr=(*structure, kkt.data), comm=PETSc.COMM_SELF)
+    factor = Factor(matrix)
+    solution, right = matrix.createVecs()
+    right.array[:] = np.append(-c[free] / stiffest, np.ones(len(free)))
+    try:
+        factor.refactor()
+        factor.solve(right, solution)
+        w = np.zeros(free.shape)
+        w[free] = solution.array_r[: len(vertex)]
+        mu = Q @ w + c + stiffest * solution.array_r[len(vertex) :, None]
+    finally:
+        for used in (solution, right, matrix):
+            used.destroy()
+    return w, np.where(free, 0.0, mu)
