@@ -6,6 +6,7 @@ with 1 if any is wrong, or if an excuse lets off more than its share.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from functools import partial
@@ -17,7 +18,7 @@ from fenicsmech.files import atomic_write
 from .record import CODE, OtherCode, append, read
 from .scene_result import SceneResult, judge
 from .summary import excessive, raw_table, table
-from .worker import Crashed, Worker
+from .worker import Crashed, side_by_side
 
 _RAW = ROOT / "docs" / "tables" / "random-scenes.csv"
 
@@ -28,6 +29,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="number of scenes")
     parser.add_argument("--seed", type=int, default=0, help="the first scene")
     parser.add_argument("--limit", type=float, default=300.0, help="seconds of a processor after which a scene hangs")
+    parser.add_argument("--processes", type=int, default=os.cpu_count(), help="scenes judged side by side")
     parser.add_argument("--quick", action="store_true", help="larger elements and fewer loads")
     parser.add_argument("--out", type=Path, default=Path("results/random-scenes"), metavar="DIR")
     options = parser.parse_args()
@@ -41,22 +43,17 @@ def main() -> int:
     except OtherCode as other:
         parser.error(str(other))
     results = {seed: result for seed, result in known.items() if seed in seeds}
-    worker, start, before = Worker(partial(judge, quick=options.quick), options.limit), time.monotonic(), len(results)
-    for seed in seeds:
-        if seed in results:
-            continue
-        try:
-            results[seed] = worker(seed)
-        except (TimeoutError, Crashed) as failure:
-            end = "hangs" if isinstance(failure, TimeoutError) else "crashes"
-            results[seed] = SceneResult(seed, "", f"wrong: {end}", str(failure), options.limit)
-        append(path, results[seed].record(), commit)
-        done, wrong = len(results), sum(result.wrong for result in results.values())
+    start, before = time.monotonic(), len(results)
+    missing = [seed for seed in seeds if seed not in results]
+    judging, failed = partial(judge, quick=options.quick), partial(_failed, options.limit)
+    for result in side_by_side(judging, missing, failed, limit=options.limit, processes=options.processes):
+        results[result.seed] = result
+        append(path, result.record(), commit)
+        done, wrong = len(results), sum(own.wrong for own in results.values())
         left = (time.monotonic() - start) / (done - before) * (options.count - done)
         print(
             f"\r{done}/{options.count} scenes, {wrong} wrong, {left:.0f} s left ", end="", file=sys.stderr, flush=True
         )
-    worker.close()
     print(file=sys.stderr)
     judged = [results[seed] for seed in seeds]
     publish("random_scenes", table(judged), write=options.write, commit=commit)
@@ -64,6 +61,11 @@ def main() -> int:
         with atomic_write(_RAW) as file:
             file.write(raw_table(judged))
     return int(bool(excessive(judged)) or any(result.wrong for result in judged))
+
+
+def _failed(limit: float, seed: int, failure: TimeoutError | Crashed) -> SceneResult:
+    end, cpu = ("hangs", limit) if isinstance(failure, TimeoutError) else ("crashes", 0.0)
+    return SceneResult(seed, "", f"wrong: {end}", str(failure), seconds=cpu, cpu=cpu)
 
 
 if __name__ == "__main__":

@@ -21,11 +21,9 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
-from queue import SimpleQueue
 from typing import Any
 
 import fenicsmech as fm
@@ -38,7 +36,7 @@ from .generator import random_scene
 from .record import CODE, OtherCode, append, read
 from .scene_result import DESIGNS, INVALID_SHARE
 from .thresholds import THRESHOLDS
-from .worker import Crashed, Worker
+from .worker import Crashed, side_by_side
 
 FIRST, COUNT = 16_000, 300
 """The block of scenes that the published table is of, which nothing was built on."""
@@ -280,17 +278,11 @@ def faults(judged: Sequence[Judged]) -> list[str]:
     return found
 
 
-def judge_in(workers: SimpleQueue[Worker[Judged]], seed: int, limit: float) -> Judged:
-    """The effectivities of a scene by one of the ``workers``, which is free again afterwards."""
-    worker = workers.get()
-    try:
-        return worker(seed)
-    except TimeoutError:
-        return Judged(seed, "", left_out="too slow", seconds=limit)
-    except Crashed:
-        return Judged(seed, "", elements=Estimate(failure="the process crashed"))
-    finally:
-        workers.put(worker)
+def failed(seed: int, failure: TimeoutError | Crashed) -> Judged:
+    """The effectivities of a scene that hangs or crashes."""
+    if isinstance(failure, TimeoutError):
+        return Judged(seed, "", left_out="too slow")
+    return Judged(seed, "", elements=Estimate(failure="the process crashed"))
 
 
 def main() -> int:
@@ -303,21 +295,16 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("results/effectivity"), metavar="DIR")
     options = parser.parse_args()
     path, wanted = options.out / f"seed-{options.seed}.jsonl", seeds(options.seed, options.count)
-    free, commit = SimpleQueue[Worker[Judged]](), revision(*CODE)
+    commit = revision(*CODE)
     try:
         known = read(path, commit, Judged.read)
     except OtherCode as other:
         parser.error(str(other))
-    for _ in range(options.processes):
-        free.put(Worker(judge, options.limit))
-    with ThreadPoolExecutor(options.processes) as threads:
-        running = [threads.submit(judge_in, free, seed, options.limit) for seed in wanted if seed not in known]
-        for done in as_completed(running):
-            found = known[done.result().seed] = done.result()
-            append(path, asdict(found), commit)
-            print(f"\r{len(known)}/{len(wanted)} scenes, seed {found.seed} ", end="", file=sys.stderr, flush=True)
-    for _ in range(options.processes):
-        free.get().close()
+    missing = [seed for seed in wanted if seed not in known]
+    for found in side_by_side(judge, missing, failed, limit=options.limit, processes=options.processes):
+        known[found.seed] = found
+        append(path, asdict(found), commit)
+        print(f"\r{len(known)}/{len(wanted)} scenes, seed {found.seed} ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     judged = [known[seed] for seed in wanted]
     publish("effectivity", table(judged), write=options.write, commit=commit)

@@ -28,9 +28,9 @@ def table(results: Iterable[SceneResult]) -> str:
     worst = max((v.residual for v in results if v.outcome == "equilibrium"), default=0.0)
     lines += [
         "",
-        f"{len(results)} scenes, {frames} equilibria checked, {cpu / max(len(results), 1):.2f} s of a processor per "
-        f"scene; largest relative residual {worst:.0e}; slowest scene "
-        f"{max((v.seconds for v in results), default=0.0):.0f} s; wrong: {sum(result.wrong for result in results)}",
+        f"{len(results)} scenes, {frames} equilibria checked; largest relative residual {worst:.0e}; "
+        f"{cpu / max(len(results), 1):.2f} s of a processor per scene, slowest scene "
+        f"{max((v.cpu for v in results), default=0.0):.0f} s of it; wrong: {sum(result.wrong for result in results)}",
         "A seed gives this scene at this commit: wider generators draw others.",
         "",
         *_coverage(results),

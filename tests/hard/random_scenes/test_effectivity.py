@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from queue import SimpleQueue
 
 import pytest
 
@@ -14,11 +13,11 @@ import fenicsmech as fm
 
 from .blueprint import Blueprint, Built
 from .draw import bending_force
-from .effectivity import Estimate, Judged, faults, judge_in, judge_scene, seeds
+from .effectivity import Estimate, Judged, failed, faults, judge_scene, seeds
 from .finer import coarse_curve, finer, refined
 from .generator import random_scene
 from .known_scenes import CLAMPED_ARCH
-from .worker import Worker
+from .worker import side_by_side
 
 
 def simple(scene: Blueprint) -> bool:
@@ -94,10 +93,7 @@ def hang(seed: int) -> Judged:
 
 @pytest.mark.parametrize(("judge", "limit", "left_out"), [(crash, 120.0, ""), (hang, 1.0, "too slow")])
 def test_scenes_that_crash_are_outside_and_those_that_hang_are_left_out(judge: Callable, limit, left_out):
-    workers = SimpleQueue[Worker[Judged]]()
-    workers.put(Worker(judge, limit))
-    found = judge_in(workers, 3, limit)
-    workers.get().close()
+    (found,) = side_by_side(judge, [3], failed, limit=limit, processes=1)
     assert found.left_out == left_out
     assert [own.outcome for own in found.kinds.values()] == ([] if left_out else ["outside"])
 

@@ -31,7 +31,7 @@ from .scene_result import SceneResult, judge, judge_frames, judge_sound
 from .stability_check import unstable_directions
 from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
-from .worker import Worker
+from .worker import Worker, side_by_side
 
 SOUND = st.integers(0, 10**6).map(lambda n: 10 * n + 5)
 SPOILED = st.integers(0, 10**6).map(lambda n: 10 * n + 1)
@@ -207,6 +207,12 @@ def test_a_judge_that_died_between_two_scenes_is_replaced():
     worker._process.join()
     assert worker(4) == "4"
     worker.close()
+
+
+def test_scenes_are_judged_side_by_side_and_each_once():
+    seeds = list(range(5))
+    found = list(side_by_side(str, seeds, lambda seed, failure: "failed", limit=60.0, processes=2))
+    assert sorted(found) == [str(seed) for seed in seeds]
 
 
 def test_quick_tables_are_not_published(monkeypatch):

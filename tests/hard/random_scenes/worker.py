@@ -10,9 +10,11 @@ import io
 import logging
 import multiprocessing
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import redirect_stderr
 from multiprocessing.connection import Connection
+from queue import SimpleQueue
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
@@ -74,6 +76,43 @@ class Worker(Generic[T]):
         self._process = context.Process(target=_serve, args=(theirs, self._judge, self._limit), daemon=True)
         self._process.start()
         theirs.close()
+
+
+def side_by_side(
+    judge: Callable[[int], T],
+    seeds: Sequence[int],
+    failed: Callable[[int, TimeoutError | Crashed], T],
+    *,
+    limit: float,
+    processes: int,
+) -> Iterator[T]:
+    """The results of scenes in the order in which they are found, by several workers.
+
+    Args:
+        judge: as of a worker.
+        seeds: of the scenes.
+        failed: the result of a scene that hangs or crashes.
+        limit: as of a worker.
+        processes: number of workers.
+    """
+    free = SimpleQueue[Worker[T]]()
+    for _ in range(processes):
+        free.put(Worker(judge, limit))
+
+    def result(seed: int) -> T:
+        worker = free.get()
+        try:
+            return worker(seed)
+        except (TimeoutError, Crashed) as failure:
+            return failed(seed, failure)
+        finally:
+            free.put(worker)
+
+    with ThreadPoolExecutor(processes) as threads:
+        for done in as_completed([threads.submit(result, seed) for seed in seeds]):
+            yield done.result()
+    for _ in range(processes):
+        free.get().close()
 
 
 def _serve(pipe: Connection, judge: Callable[[int], T], limit: float) -> None:
