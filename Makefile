@@ -65,8 +65,7 @@ lint: install-test ## style, types and layering: seconds
 	$(call heading,lint)
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
-	$(PYTHON) -m mypy
-	$(PYTHON) -m pytest -q tests/test_layering.py
+	$(PYTHON) -m mypy & types=$$!; $(PYTHON) -m pytest -q tests/test_layering.py; layers=$$?; wait $$types && exit $$layers
 
 # Two processes side by side, half of the tests each; the one that is done first takes over tests of the other. What is
 # marked `parallel` runs on ranks instead.
@@ -137,7 +136,7 @@ test-newest: install-test ## the same with Debian's newest (sid), which moves by
 
 docs: install-docs ## the pages in docs/_build/html; warnings are errors
 	$(call heading,documentation)
-	$(PYTHON) -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	$(PYTHON) -m sphinx -q -W --keep-going -j auto -b html docs docs/_build/html
 
 demos-quick: $(DEMOS:%=demo-quick-%) ## the demos that optimise or fit, coarse, in results/quick/
 

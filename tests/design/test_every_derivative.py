@@ -96,16 +96,15 @@ def _zero(size: int) -> float | tuple[float, ...]:
     return 0.0 if size == 1 else (0.0,) * size
 
 
-@pytest.mark.parallel
 @pytest.mark.parametrize(
     ("space", "shapes", "formulation"),
     [
-        pytest.param("plane-stress", "mirrored", None),
+        pytest.param("plane-stress", "mirrored", None, marks=pytest.mark.parallel),
         pytest.param("plane-strain", "shifted", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
         pytest.param("3d-symmetric", "same", None, marks=pytest.mark.thorough),
         pytest.param("3d-symmetric", "shifted", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
         pytest.param("3d", "mirrored", None, marks=pytest.mark.thorough),
-        pytest.param("3d", "shifted", None, marks=pytest.mark.thorough),
+        pytest.param("3d", "shifted", None, marks=(pytest.mark.thorough, pytest.mark.parallel)),
         pytest.param("3d", "mirrored", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
     ],
 )

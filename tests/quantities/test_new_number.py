@@ -145,7 +145,13 @@ KINDS = {
 }
 
 
-@pytest.fixture(scope="module", params=["plane-stress", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param("plane-stress", marks=pytest.mark.parallel),
+        pytest.param("3d-symmetric", marks=pytest.mark.thorough),
+    ],
+)
 def bench(request) -> Bench:
     def effects(mechanism: fm.Mechanism) -> list[fm.Effect]:
         return [Foundation(mechanism.flexible_links[1], 0.02), Ballast(mechanism.rigid_links[1], 3.0)]
@@ -153,7 +159,6 @@ def bench(request) -> Bench:
     return Bench(request.param, MPI.COMM_WORLD, effects=effects)
 
 
-@pytest.mark.parallel
 @pytest.mark.parametrize("name", KINDS)
 def test_derivatives_by_a_new_number(bench, name):
     describe, steps = KINDS[name]

@@ -21,7 +21,7 @@ def effects(mechanism: fm.Mechanism) -> Sequence[fm.Effect]:
 @pytest.fixture(
     scope="module",
     params=[
-        "plane-stress",
+        pytest.param("plane-stress", marks=pytest.mark.parallel),
         *(pytest.param(own, marks=pytest.mark.thorough) for own in ("plane-strain", "3d-symmetric")),
     ],
 )
@@ -30,7 +30,6 @@ def bench(request) -> Bench:
     return Bench(request.param, MPI.COMM_WORLD, pressure, effects=effects)
 
 
-@pytest.mark.parallel
 @pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.thorough)])
 def test_derivatives_by_a_change_of_temperature(bench, count):
     warmings = bench.simulation.scene.effects[1 - count // 2 : 2]
