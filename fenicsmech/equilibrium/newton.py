@@ -217,6 +217,11 @@ class NewtonSolver(EquilibriumSolver):
                 if kept and (moved := system.size(step)) <= options.contraction * raising:
                     diverged, raising = diverged or before, moved
                 else:
+                    if best[1].norm <= self.rounding(best[1]):  # the step strained stiff links that it turned
+                        try:
+                            return self.accept_best(*best, control, residuals, NotConverged("", iteration + 1))
+                        except NotConverged:
+                            system.load(state)
                     # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None
                     # no step led to this residual: as large as before does not mean that it no longer falls

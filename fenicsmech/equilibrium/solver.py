@@ -26,6 +26,7 @@ from fenicsmech.errors import counted, expect, set_options
 _STRETCHED = 5e-3  # motion over the mechanism's length, about an element's size, that rounds u as F = I + ∇u is
 _NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
 _ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
+_TURNED = 1e-6  # likewise along the next step, where stiff links turn
 STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
 
@@ -163,7 +164,7 @@ class EquilibriumSolver(ABC):
 
     def relative(self, residual: Residual) -> float:
         """The residual over the forces that balance in it."""
-        return residual.norm / max(residual.forces, self._rounding(residual))
+        return residual.norm / max(residual.forces, self.rounding(residual))
 
     def step_accuracy(self, residual: Residual) -> float:
         """Admissible relative error of a Newton step, 1e-3 far from the equilibrium.
@@ -187,7 +188,7 @@ class EquilibriumSolver(ABC):
         if residual.norm <= self.options.tolerance * residual.forces < math.inf and residual.gap <= 1e-10:
             return True
         steady = 0.25 * before < residual.norm and (not before or residual.norm <= 2.0 * before)
-        return steady and residual.norm <= max(self._rounding(residual), noise) < math.inf
+        return steady and residual.norm <= max(self.rounding(residual), noise) < math.inf
 
     def accept(
         self, state: State, control: Control, residual: Residual, residuals: Sequence[float], iterations: int
@@ -205,14 +206,18 @@ class EquilibriumSolver(ABC):
         residual r still asks for, of largest motion |x|: soft springs may be out of balance by less than |r| tells,
 
             r · x ≤ 1e-4 forces |x|,     K x = r.
+
+        Where stiff links turn, their rounding may be more of the forces, but along x only 1e-6 of them.
         """
-        if not residual.norm <= self.roundoff(residual) < math.inf:
+        near_singular = residual.norm <= self.roundoff(residual)
+        if not (near_singular or residual.norm <= self.rounding(residual)) or not math.isfinite(residual.norm):
             raise failure
         at = self.linearise(best, control, iterations=failure.iterations)
         x = at.solve(at.residual.vector)
         motion = self.system.size(self.system.unknowns.step(x))
         work = abs(x.dot(at.residual.vector)) / self.system.unknowns.unit
-        if not (motion <= _NO_MOTION or work <= _ROUNDING * at.residual.forces * motion):
+        share = _ROUNDING if near_singular else _TURNED
+        if not (motion <= _NO_MOTION or work <= share * at.residual.forces * motion):
             raise failure
         residuals = [*residuals[: failure.iterations], self.relative(at.residual)]
         return at.point(residuals, failure.iterations, tolerance=STEP)
@@ -227,7 +232,7 @@ class EquilibriumSolver(ABC):
             f"the residual is {residuals[-1]:.1e} of the forces after {counted(iterations, 'iteration')}", iterations
         )
 
-    def _rounding(self, residual: Residual) -> float:
+    def rounding(self, residual: Residual) -> float:
         """Rounding of displacements and rotations, which are counted from the drawn configuration.
 
         Less than ``_NO_MOTION`` of the mechanism's length counts as no displacement. Where effects load links, that of

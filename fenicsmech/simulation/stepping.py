@@ -357,7 +357,7 @@ class CurveStepper:
                     self.solver, first.state, control.at(1.0), ArcSteps(), most=LoadSteps().arc_steps
                 )
             except NotConverged:
-                if (found := self._snapped(failure, control)) is None:
+                if (found := self._snapped(failure, control, "the motors")) is None:
                     raise self._unposed(failure, fraction, wound) from failure
                 state = found
             else:
@@ -368,12 +368,13 @@ class CurveStepper:
         self._effort += Effort(stepper.iterations, stepper.snaps)
         return state
 
-    def _snapped(self, failure: LoadStepsFailed, control: MotorControl) -> State | None:
-        """The equilibrium at the end of the motors' way after a snap where load steps ended; None if none is found.
+    def _snapped(self, failure: LoadStepsFailed, control: MotorControl | LoadFactorControl, what: str) -> State | None:
+        """The equilibrium at the end of the way of motors or constant loads, ``what``, after a snap where load steps
+        ended; None if none is found.
 
-        The mechanism snaps to where descent, by steps that turn links, leads from the last equilibrium, with motors as
-        little farther as it takes to find one: by 1/64 of the way left, 1/32, …, all of it. From there load steps go
-        on.
+        The mechanism snaps to where descent, by steps that turn links, leads from the last equilibrium, as little
+        farther on the way as it takes to find one: by 1/64 of what is left, 1/32, …, all of it. From there load steps
+        go on.
         """
         solver = self.solver.turning
         if failure.last is None or solver is None or not isinstance(solver.options, PrimalDualNewton):
@@ -397,7 +398,7 @@ class CurveStepper:
                 continue
             finally:
                 iterations += point.iterations + stepper.iterations
-            _log.warning("%s: the path of the motors turns back; curves start after a snap", self.request.where)
+            _log.warning("%s: the path of %s turns back; curves start after a snap", self.request.where, what)
             self._effort += Effort(iterations, 1)
             return state
         return None
@@ -443,6 +444,8 @@ class CurveStepper:
                     self.request.where,
                 )
                 self._effort += Effort(snaps=1)
+                return found
+            if (found := self._snapped(failure, control, "constant loads")) is not None:
                 return found
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])

@@ -97,6 +97,18 @@ def test_what_rounding_leaves_of_a_pressure_is_no_imbalance_beside_loads_of_a_tr
     assert result.outcome.startswith("equilibrium") and result.frames == 2, result
 
 
+@pytest.mark.slow
+def test_weights_and_a_spring_that_buckle_a_linkage_find_where_it_snaps_to():
+    result = judge(19308)
+    assert result.outcome == "equilibrium" and result.frames == 2, result
+
+
+@pytest.mark.slow
+def test_rubber_moves_steel_under_a_force_of_which_rounding_of_the_steel_leaves_four_digits():
+    result = judge(19089)
+    assert result.outcome.startswith("equilibrium") and result.frames == 2, result
+
+
 def test_every_seed_gives_the_same_scene_again():
     assert [random_scene(seed) for seed in range(50)] == [random_scene(seed) for seed in range(50)]
     assert len({repr(random_scene(seed)) for seed in range(50)}) == 50
