@@ -53,9 +53,12 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
     """How far a ``travel`` of the forces' points from the drawn configuration is beyond the reach of rigid links on the
     ground, over the mechanism's length; −∞ where flexible links, slides or joints that give way are in between.
 
-    A point in the interface of a flexible link's joint moves with that as a rigid body."""
+    A point in the interface of a flexible link's joint moves with that as a rigid body. Welds, and joints whose motors
+    stay as drawn, make one body of two."""
     soft = {plan.joint for plan in scene.effects if isinstance(plan, CompliancePlan)}
-    pins = {joint.name: joint for joint in scene.joints if joint.kind != "prismatic" and joint.name not in soft}
+    still = {motor.joint for motor in scene.motors if not motor.position}
+    stiff = [joint for joint in scene.joints if joint.name not in soft]
+    welds = {joint.name for joint in stiff if joint.kind == "weld" or joint.name in still}
 
     def chains(link: LinkPlan, point: np.ndarray, passed: tuple[str, ...]) -> Iterator[tuple[np.ndarray, float]]:
         """x₀ and ρ of the chains that end at a ``point`` of a link."""
@@ -63,15 +66,17 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
             yield point, 0.0
         if link.fixed:
             return
-        for joint in pins.values():
-            if link.name in (joint.a, joint.b) and joint.name not in passed:
+        for joint in stiff:
+            pinned = joint.kind != "prismatic" or joint.name in welds
+            if pinned and link.name in (joint.a, joint.b) and joint.name not in passed:
                 other, pin = scene.link(joint.b if link.name == joint.a else joint.a), _in_space(joint.at)
                 arm = float(np.linalg.norm(point - pin))
                 radius = joint.interface if isinstance(joint.interface, float) else 0.0  # clamps are not turned about
                 if link.centreline and not arm < _WITHIN * radius:
                     continue
-                for ground, reach in chains(other, pin, (*passed, joint.name)):
-                    yield ground, reach + arm
+                at, own = (point, 0.0) if joint.name in welds else (pin, arm)
+                for ground, reach in chains(other, at, (*passed, joint.name)):
+                    yield ground, reach + own
 
     least = most = 0.0
     for ratio, force in zip(scene.ratios, scene.forces, strict=False):

@@ -16,6 +16,7 @@ from .blueprint import (
     ForcePlan,
     JointPlan,
     LinkPlan,
+    MotorPlan,
     PlanePlan,
     SpringPlan,
     build,
@@ -167,6 +168,19 @@ def test_rigid_links_reach_no_farther_than_they_are_long_and_flexible_ones_and_s
     slides = tuple(replace(joint, kind="prismatic") if joint.name in "AC" else joint for joint in up.joints)
     for other in (*loose, replace(up, joints=slides)):
         assert beyond_chains(other, 1e3) == -np.inf
+
+
+def test_a_point_in_an_interface_turns_about_the_pin_of_a_crank_that_its_motor_holds():
+    # 1 to the right of the pin at (0, 10), pushed up
+    off = replace(hung(), forces=(ForcePlan("load", "strip", (1.0, 10.0), (0.0, 1.0)),))
+    held = replace(off, motors=(MotorPlan("A", 0.0),))
+    assert [beyond_chains(held, travel) > 0.0 for travel in (-1.1, -0.9, 0.9, 1.1)] == [True, False, False, True]
+    # the crank turns too; its pin may get to (0, -10)
+    turned = replace(off, motors=(MotorPlan("A", 0.5),))
+    for free in (off, turned):
+        assert [beyond_chains(free, travel) > 0.0 for travel in (-21.1, -20.9, 0.9, 1.1)] == [True, False, False, True]
+    welded = tuple(replace(joint, kind="weld") if joint.name == "A" else joint for joint in off.joints)
+    assert beyond_chains(replace(off, joints=welded), 1.1) == pytest.approx(0.1 / off.length)
 
 
 def test_stiffness_is_compared_at_stable_equilibria_that_second_differences_confirm(raised):
