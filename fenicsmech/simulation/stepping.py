@@ -607,17 +607,22 @@ class CurveStepper:
         if imbalance <= _BALANCED:
             return point, imbalance
         reached = min(options.tolerance, max(point.residuals[-1], _ROUNDING))
-        finer = copy(self.solver)  # with the same factor
+        finer = copy(self.solver.turning or self.solver)  # with the same factor
         finer.options = replace(options, tolerance=0.1 * _BALANCED / imbalance * reached)
-        try:
-            found = finer.solve(point.state, control)
-        except NotConverged as failure:
-            self._effort += Effort(failure.iterations)
-            return point, imbalance
-        self._effort += Effort(found.iterations)
-        left = self._imbalance(found.state, control)
-        better = left < 0.5 * imbalance and found.unstable_modes <= point.unstable_modes
-        return (found, left) if better else (point, imbalance)
+        # shifts slow steps down along the motions that are out of balance
+        for shift in LoadSteps().least_shifts(point.state.minimum_shift).elsewhere:
+            try:
+                found = finer.solve(replace(point.state, minimum_shift=shift), control)
+            except NotConverged as failure:
+                self._effort += Effort(failure.iterations)
+                continue
+            self._effort += Effort(found.iterations)
+            left = self._imbalance(found.state, control)
+            if left < 0.5 * imbalance and found.unstable_modes <= point.unstable_modes:
+                point, imbalance = found, left
+            if imbalance <= _BALANCED:
+                break
+        return point, imbalance
 
     def _imbalance(self, state: State, control: Control) -> float:
         """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.
@@ -657,11 +662,17 @@ class CurveStepper:
         return model.mesh.mesh.comm.allreduce(float(nodal @ velocity.ravel()))
 
     def _effect_forces(self, state: State) -> float:
-        """Sum of the sizes of all forces of effects that grow with the load factor."""
+        """Sum of the sizes of all forces of effects that grow with the load factor.
+
+        Those on a flexible link count by their sum: what balances on each link, as pressure all around it does, works
+        along no motion that deforms none.
+        """
         model, total = self._model, 0.0
         if model.elastic.depends_on_load_factor:
-            local = float(np.abs(model.elastic.load_factor_residuals()).sum())
-            total += model.mesh.mesh.comm.allreduce(local, op=MPI.SUM)
+            owned, links = model.interfaces.owned, len(model.mechanism.flexible_links)
+            nodal = model.elastic.load_factor_residuals()[: owned * model.interfaces.block].reshape(owned, -1)
+            sums = [np.bincount(model.node_link[:owned], part, minlength=links) for part in nodal.T]
+            total += float(np.abs(model.mesh.mesh.comm.allreduce(np.array(sums), op=MPI.SUM)).sum())
         for potential in model.potentials:
             if not potential.holds:
                 slope = potential.gradient(state.poses).reshape(len(potential.bodies), -1)

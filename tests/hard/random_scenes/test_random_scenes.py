@@ -109,6 +109,12 @@ def test_rubber_moves_steel_under_a_force_of_which_rounding_of_the_steel_leaves_
     assert result.outcome.startswith("equilibrium") and result.frames == 2, result
 
 
+@pytest.mark.slow
+def test_a_small_force_balances_beside_reactions_of_a_prestrained_rod_a_hundred_thousand_times_as_large():
+    result = judge(18468)
+    assert result.outcome == "equilibrium" and result.frames == 2, result
+
+
 def test_every_seed_gives_the_same_scene_again():
     assert [random_scene(seed) for seed in range(50)] == [random_scene(seed) for seed in range(50)]
     assert len({repr(random_scene(seed)) for seed in range(50)}) == 50
