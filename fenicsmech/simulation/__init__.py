@@ -2,7 +2,10 @@
 
 - ``simulation``: the entry point, which computes curves
 - ``discretisation``: the meshed and compiled parts that simulations of several designs share
+- ``request``: what is asked for, checked before anything is meshed
 - ``stepping``: curves at prescribed values
+- ``balance``: whether loads balance along motions that deform no link
+- ``rest_start``: where curves start
 - ``following``: curves along a path until an end, with its events
 - ``safe_range``: the range of a force that links bear
 - ``frame``, ``curve``: results and their evaluation
@@ -22,6 +25,6 @@ from fenicsmech.simulation.fields import (
 from fenicsmech.simulation.following import FollowedCurve, PathEvent, Until
 from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode
 from fenicsmech.simulation.omitted_effects import Explanation, Hint, PinFriction, weight_influence
+from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.safe_range import SafeLimit, SafeRange, SafeRangeOptions
 from fenicsmech.simulation.simulation import RestShape, Simulation
-from fenicsmech.simulation.stepping import CurveRequest, read_request

@@ -29,7 +29,8 @@ from fenicsmech.plot import CurveMark, CurveSeries
 from fenicsmech.simulation.curve import Curve, axes
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame, ModeShape, mode_shape
-from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, check_force, check_motors, read_others
+from fenicsmech.simulation.request import CurveRequest, check_force, check_motors, read_others
+from fenicsmech.simulation.stepping import CurveStepper
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ from fenicsmech.simulation.curve import axes
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.following import CurveFollower, Until
 from fenicsmech.simulation.frame import Frame
-from fenicsmech.simulation.stepping import CurveRequest, CurveStepper
+from fenicsmech.simulation.request import CurveRequest
+from fenicsmech.simulation.stepping import CurveStepper
 from fenicsmech.stress import Safety
 
 

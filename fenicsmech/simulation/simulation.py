@@ -44,8 +44,9 @@ from fenicsmech.simulation.fields import rest_vertices
 from fenicsmech.simulation.following import CurveFollower, FollowedCurve, PathEvent, Until, branches, read_path
 from fenicsmech.simulation.frame import ModeShape
 from fenicsmech.simulation.omitted_effects import coarse_links
+from fenicsmech.simulation.request import CurveRequest, check_force, read_others, read_request
 from fenicsmech.simulation.safe_range import SafeRange, SafeRangeOptions, SafeRangeSearch, read_bounds
-from fenicsmech.simulation.stepping import CurveRequest, CurveStepper, check_force, read_others, read_request
+from fenicsmech.simulation.stepping import CurveStepper
 from fenicsmech.stress import SingularPlace, StressOptions, check_allowables
 
 _log = logger(__name__)

@@ -1,24 +1,19 @@
-"""Curves at prescribed values: the request, checked before anything is meshed, and the load steps through all values.
+"""Curves at prescribed values: the load steps through all of them.
 
 A curve starts from the unloaded configuration, under constant loads. The prescribed part is a force or motors; both
-give a curve of force (or torque) over displacement (or position).
-
-Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
-fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no link, and
-so do their errors: the work along these is precise, and equilibria whose loads do not balance along them are refused.
+give a curve of force (or torque) over displacement (or position). Equilibria whose loads do not balance along motions
+that deform no link are refused (see ``balance``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
 
 import numpy as np
-from mpi4py import MPI
 
 from fenicsmech.collective import agreed, from_one
 from fenicsmech.continuation import ArcSteps, DeadCentreStepper, LoadStepper, LoadSteps, LoadStepsFailed, follow_to
@@ -36,109 +31,18 @@ from fenicsmech.equilibrium import (
     joint_reactions,
     motor_torques,
 )
-from fenicsmech.errors import DescriptionError, EquilibriumError, finite
+from fenicsmech.errors import EquilibriumError
 from fenicsmech.log import logger
-from fenicsmech.mechanism import Configuration, Force, ForceGroup, Mechanism, Motor, PrescribedPart
-from fenicsmech.multibody import (
-    Assembly,
-    BodyPoint,
-    Motion,
-    assemble_before_strain,
-    count_freedom,
-    free_motions,
-    is_held,
-    stiff_motions,
-)
+from fenicsmech.multibody import Assembly, BodyPoint, assemble_before_strain, count_freedom, free_motions, is_held
+from fenicsmech.simulation.balance import Balance
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestPoses
 
 _log = logger(__name__)
-# work along motions that deform no link, over loads times the greatest velocity
-_BALANCED = 1e-6  # that is small
-_LOST = 1e-4  # that leaves the rest position unknown
-_ROUNDING = 1e-16  # least relative residual
-
-
-@dataclass(frozen=True)
-class CurveRequest:
-    """A load–displacement curve to be computed.
-
-    Attributes:
-        part: the force that changes, or the motors that move.
-        controls: prescribed values, as loads or as displacements counted from the unloaded configuration; none if
-            the curve is followed.
-        configuration: motor positions; the initial ones of motors that move.
-        others: constant magnitudes of other forces.
-    """
-
-    part: PrescribedPart
-    controls: tuple[Control, ...]
-    configuration: Configuration
-    others: tuple[tuple[Force, float], ...]
-
-    @property
-    def where(self) -> str:
-        """The part and the configuration, for messages."""
-        return f"{self.part.name!r} in configuration {self.configuration.name!r}"
-
-
-def read_request(
-    mechanism: Mechanism,
-    force: Force | ForceGroup,
-    *,
-    forces: Sequence[float] | None,
-    displacements: Sequence[float] | None,
-    configuration: Configuration,
-    others: Mapping[Force, float] | None,
-) -> CurveRequest:
-    """The request for a curve at prescribed values, if it makes sense for ``mechanism``."""
-    check_force(mechanism, force)
-    constant = read_others(mechanism, force, configuration, others)
-    if (forces is None) == (displacements is None):
-        given = "both forces and displacements are given" if forces is not None else "no values are given"
-        raise DescriptionError(f"{force.name!r}", given, "Give either forces or displacements")
-    kind, values = (DisplacementControl, displacements) if forces is None else (LoadControl, forces)
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise DescriptionError(f"{force.name!r}", f"its prescribed values are {values!r}", "Give a list of numbers")
-    controls = tuple(kind(finite(f"prescribed value of {force.name!r}", value)) for value in values)
-    if not controls:
-        raise DescriptionError(f"{force.name!r}", "no value is prescribed", "Give at least one force or displacement")
-    return CurveRequest(force, controls, configuration, constant)
-
-
-def read_others(
-    mechanism: Mechanism, part: PrescribedPart, configuration: Configuration, others: Mapping[Force, float] | None
-) -> tuple[tuple[Force, float], ...]:
-    """The constant forces in addition to ``part``, if they and the configuration are of ``mechanism``."""
-    others = dict(others or {})
-    for other in others:
-        check_force(mechanism, other)
-    if isinstance(part, Force | ForceGroup) and not others.keys().isdisjoint(dict(part.ratios)):
-        raise DescriptionError(f"{part.name!r}", "it is to change and to be held constant", "Leave it out of others")
-    if not isinstance(configuration, Configuration):
-        raise DescriptionError(
-            f"configuration {configuration!r}", "it is not a configuration", "Make one with scene.configuration()"
-        )
-    remedy = "Make the configuration with this mechanism's scene"
-    check_motors(mechanism, f"configuration {configuration.name!r}", configuration.positions, remedy)
-    return tuple((other, finite(f"magnitude of {other.name!r}", value)) for other, value in others.items())
-
-
-def check_force(mechanism: Mechanism, part: object) -> None:
-    """Raises a DescriptionError unless ``part`` is a force of ``mechanism``, or a group of them."""
-    for force in dict(part.ratios) if isinstance(part, Force | ForceGroup) else (part,):
-        if force not in mechanism.forces:
-            name = force.name if isinstance(force, Force) else force
-            raise DescriptionError(f"{name!r}", f"it is not a force of {mechanism.name!r}", "Add it with force()")
-
-
-def check_motors(mechanism: Mechanism, where: str, motors: Iterable[tuple[Motor, float]], remedy: str) -> None:
-    """Raises a DescriptionError unless ``motors`` are motors of ``mechanism``."""
-    for motor, _ in motors:
-        if motor not in mechanism.motors:
-            raise DescriptionError(where, f"{motor.name!r} is not a motor of {mechanism.name!r}", remedy)
+_LOST = 1e-4  # work along motions that deform no link, over loads times the greatest velocity, that leaves rest unknown
 
 
 class CurveStepper:
@@ -252,7 +156,8 @@ class CurveStepper:
                 point = found
             imbalance = 0.0
             if self.freedom.mobility and not control.constrained:
-                point, imbalance = self._balanced(point, control)
+                point, imbalance, spent = Balance(self._model, self.solver).improved(point, control)
+                self._effort += Effort(spent)
             record = self.record(point)
             if imbalance > _LOST:
                 names = ", ".join(map(repr, self.freedom.mobile))
@@ -594,88 +499,3 @@ class CurveStepper:
             return bool(np.min(held[held > free.rounding], initial=np.inf) < least)
 
         return bool(springs) and from_one(self.discretisation.comm, softer)
-
-    # -- residual along zero-energy modes -----------------------------------------------------------------------
-
-    def _balanced(self, point: EquilibriumPoint, control: Control) -> tuple[EquilibriumPoint, float]:
-        """The equilibrium at ``point``, or near it if loads balance better there, and their imbalance.
-
-        Beside reactions ten thousand times the loads, a residual that is small leaves motions that these alone resist,
-        as the spin of a link between ball joints, far from where they come to rest: there it must be smaller still.
-        """
-        imbalance, options = self._imbalance(point.state, control), self.solver.options
-        if imbalance <= _BALANCED:
-            return point, imbalance
-        reached = min(options.tolerance, max(point.residuals[-1], _ROUNDING))
-        finer = copy(self.solver.turning or self.solver)  # with the same factor
-        finer.options = replace(options, tolerance=0.1 * _BALANCED / imbalance * reached)
-        # shifts slow steps down along the motions that are out of balance
-        for shift in LoadSteps().least_shifts(point.state.minimum_shift).elsewhere:
-            try:
-                found = finer.solve(replace(point.state, minimum_shift=shift), control)
-            except NotConverged as failure:
-                self._effort += Effort(failure.iterations)
-                continue
-            self._effort += Effort(found.iterations)
-            left = self._imbalance(found.state, control)
-            if left < 0.5 * imbalance and found.unstable_modes <= point.unstable_modes:
-                point, imbalance = found, left
-            if imbalance <= _BALANCED:
-                break
-        return point, imbalance
-
-    def _imbalance(self, state: State, control: Control) -> float:
-        """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.
-
-        Of the work of each reaction, 1e-12 is left by rounding of their sum, which vanishes; 0 where nothing acts, or
-        nothing moves. Links do no work where nothing strains them, however their nodal forces are rounded: those of
-        loads and effects count.
-        """
-        self._system.load(state)
-        model, joints, residual = self._model, self._joints, self._system.residual(state, control)
-        nodal = -self._system.nodal_loads(state)
-        if model.elastic.depends_on_load_factor:
-            nodal += state.load_factor * model.elastic.load_factor_residuals()[: len(nodal)]
-        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum())
-        loads, worst = loads + self._effect_forces(state), 0.0
-        reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
-        # all processes take the same basis of the motions
-        comm = self.discretisation.comm
-        for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
-            rounding = 1e-12 * float(reactions @ np.abs(motion.z))
-            work = abs(self._work(nodal, state, motion) + float(residual.rigid @ motion.z))
-            worst = max(worst, (work - rounding) / motion.fastest(model.linkage.length))
-        return agreed(comm, worst / loads if loads > 0.0 else 0.0)
-
-    def _work(self, nodal: np.ndarray, state: State, motion: Motion) -> float:
-        """r · u̇ of ``nodal`` forces r on links, (owned displacements,), along a motion."""
-        model, linkage, owned = self._model, self._model.linkage, self._model.interfaces.owned
-        u = state.u[: owned * model.interfaces.block].reshape(owned, -1)
-        places = u + model.elastic.drawn_nodes[:owned] + model.design_nodes.values(model.elastic.design)[:owned]
-        velocity = np.zeros(u.shape)
-        for number, link in enumerate(model.mechanism.flexible_links):
-            body = linkage.interfaces[link][0]
-            nodes = np.flatnonzero(model.node_link[:owned] == number)
-            centre = np.array(linkage.bodies[body].centre) + state.poses[body, : linkage.dim]
-            offsets = places[nodes][:, : linkage.dim] - centre
-            velocity[nodes, : linkage.dim] = motion.at(body, offsets)
-        return model.mesh.mesh.comm.allreduce(float(nodal @ velocity.ravel()))
-
-    def _effect_forces(self, state: State) -> float:
-        """Sum of the sizes of all forces of effects that grow with the load factor.
-
-        Those on a flexible link count by their sum: what balances on each link, as pressure all around it does, works
-        along no motion that deforms none.
-        """
-        model, total = self._model, 0.0
-        if model.elastic.depends_on_load_factor:
-            owned, links = model.interfaces.owned, len(model.mechanism.flexible_links)
-            nodal = model.elastic.load_factor_residuals()[: owned * model.interfaces.block].reshape(owned, -1)
-            sums = [np.bincount(model.node_link[:owned], part, minlength=links) for part in nodal.T]
-            total += float(np.abs(model.mesh.mesh.comm.allreduce(np.array(sums), op=MPI.SUM)).sum())
-        for potential in model.potentials:
-            if not potential.holds:
-                slope = potential.gradient(state.poses).reshape(len(potential.bodies), -1)
-                total += float(np.abs(slope[:, : model.linkage.dim]).sum())
-                total += float(np.abs(slope[:, model.linkage.dim :]).sum()) / model.linkage.length
-        return total
