@@ -64,9 +64,9 @@ class Balance:
     def imbalance(self, state: State, control: Control) -> float:
         """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.
 
-        Of the work of each reaction, 1e-12 is left by rounding of their sum, which vanishes; 0 where nothing acts, or
-        nothing moves. Links do no work where nothing strains them, however their nodal forces are rounded: those of
-        loads and effects count.
+        Of the work of each reaction, 1e-12 is left by rounding of their sum, which vanishes, and of effects 1e-14 of
+        what balances on each link; 0 where nothing acts, or nothing moves. Links do no work where nothing strains them,
+        however their nodal forces are rounded: those of loads and effects count.
         """
         model, system = self._model, self._solver.system
         system.load(state)
@@ -74,15 +74,17 @@ class Balance:
         nodal = -system.nodal_loads(state)
         if model.elastic.depends_on_load_factor:
             nodal += state.load_factor * model.elastic.load_factor_residuals()[: len(nodal)]
-        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum())
-        loads, worst = loads + self._effect_forces(state), 0.0
+        effects, cancelled = self._effect_forces(state)
+        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum()) + effects
+        worst = 0.0
         reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
         # all processes take the same basis of the motions
         comm = model.mesh.mesh.comm
         for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
-            rounding = 1e-12 * float(reactions @ np.abs(motion.z))
+            fastest = motion.fastest(model.linkage.length)
+            rounding = 1e-12 * float(reactions @ np.abs(motion.z)) + 1e-14 * cancelled * fastest
             work = abs(self._work(nodal, state, motion) + float(rigid @ motion.z))
-            worst = max(worst, (work - rounding) / motion.fastest(model.linkage.length))
+            worst = max(worst, (work - rounding) / fastest)
         return agreed(comm, worst / loads if loads > 0.0 else 0.0)
 
     def _work(self, nodal: np.ndarray, state: State, motion: Motion) -> float:
@@ -99,21 +101,22 @@ class Balance:
             velocity[nodes, : linkage.dim] = motion.at(body, offsets)
         return model.mesh.mesh.comm.allreduce(float(nodal @ velocity.ravel()))
 
-    def _effect_forces(self, state: State) -> float:
-        """Sum of the sizes of all forces of effects that grow with the load factor.
+    def _effect_forces(self, state: State) -> tuple[float, float]:
+        """Sum of the sizes of all forces of effects that grow with the load factor; the same of what balances.
 
         Those on a flexible link count by their sum: what balances on each link, as pressure all around it does, works
         along no motion that deforms none.
         """
-        model, total = self._model, 0.0
+        model, total, nodal = self._model, 0.0, np.zeros((0, self._model.linkage.dim))
         if model.elastic.depends_on_load_factor:
             owned, links = model.interfaces.owned, len(model.mechanism.flexible_links)
             nodal = model.elastic.load_factor_residuals()[: owned * model.interfaces.block].reshape(owned, -1)
-            sums = [np.bincount(model.node_link[:owned], part, minlength=links) for part in nodal.T]
-            total += float(np.abs(model.mesh.mesh.comm.allreduce(np.array(sums), op=MPI.SUM)).sum())
+            sums = np.array([np.bincount(model.node_link[:owned], part, minlength=links) for part in nodal.T])
+            total += float(np.abs(model.mesh.mesh.comm.allreduce(sums, op=MPI.SUM)).sum())
+        cancelled = model.mesh.mesh.comm.allreduce(float(np.abs(nodal).sum()))
         for potential in model.potentials:
             if not potential.holds:
                 slope = potential.gradient(state.poses).reshape(len(potential.bodies), -1)
                 total += float(np.abs(slope[:, : model.linkage.dim]).sum())
                 total += float(np.abs(slope[:, model.linkage.dim :]).sum()) / model.linkage.length
-        return total
+        return total, cancelled
