@@ -27,15 +27,25 @@ async def events(process: asyncio.subprocess.Process) -> AsyncIterator[dict[str,
 
 
 async def ended(process: asyncio.subprocess.Process) -> int:
-    """How a process ended; what was written to it as it went is given up."""
+    """How a process ended, which is killed or about to end; what was written to it as it went is given up.
+
+    One that is cancelled waits all the same: what belongs to a process is released only once its end is seen.
+    """
     assert process.stdin is not None, "it is a pipe"
-    code = await process.wait()
+    cancelled = None
+    while process.returncode is None:
+        try:
+            await process.wait()
+        except asyncio.CancelledError as again:
+            cancelled = again
     process.stdin.close()
+    if cancelled is not None:
+        raise cancelled
     closed = asyncio.ensure_future(process.stdin.wait_closed())
     await asyncio.wait([closed], timeout=_CLOSING)
     if not closed.cancel():
         closed.exception()  # a broken pipe
-    return code
+    return process.returncode
 
 
 class Job:

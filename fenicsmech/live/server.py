@@ -282,7 +282,7 @@ class Server:
         finally:
             if process.returncode is None:
                 process.kill()
-                await process.wait()
+                await ended(process)
 
     async def _from_page(self, message: Mapping[str, Any], page: Outbox) -> None:
         if message["kind"] == "solve solid":
