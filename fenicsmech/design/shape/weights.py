@@ -190,15 +190,17 @@ def solve_partition(
         rounds: maximum number of exchanges.
 
     Raises:
-        FenicsmechError: weights keep changing sides.
+        FenicsmechError: weights keep changing sides, or Q is singular.
     """
-    stiff, least, patience = Q.diagonal()[:, None], c.size + 1, _PATIENCE
+    stiff, count, least, patience = Q.diagonal()[:, None], c.size, c.size + 1, _PATIENCE
     w = splu(csc_matrix(Q), permc_spec="MMD_AT_PLUS_A").solve(-c)  # without bounds; weights of handles sum to one so
     free = w > tolerance
     for _ in range(rounds):
         empty = ~free.any(axis=1)
         free[empty, w[empty].argmax(axis=1)] = True  # one at least carries the sum
         w, mu = _with_free(Q, c, free)
+        if not np.isfinite(w).all():
+            break
         violated = np.where(free, w < -tolerance, mu < -tolerance * stiff)
         count = np.count_nonzero(violated)
         if count == 0:
