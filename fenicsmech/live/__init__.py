@@ -5,7 +5,8 @@
 - ``project``: mechanism, curves, targets and design as plain JSON; ``schema``: what plain data may be
 - ``messages``: what page, server and solver process say to each other
 - ``session``: project, history, and what a gesture leads to
-- ``server``: static files and a WebSocket on 127.0.0.1; ``solver``: the process that computes, ended at any time
+- ``server``: static files and a WebSocket on 127.0.0.1; ``solver``: the process that computes, ended at any time;
+  ``solver_process`` keeps it alive
 - ``responses``: linear ones of what the page draws; ``grip``: a point that the pointer holds
 - ``cancel``: equilibria that a new gesture ends at their next iteration; ``problems``, with their remedies
 - ``solid``: the process that solves in space; ``job``: runs it

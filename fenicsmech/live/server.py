@@ -26,13 +26,13 @@ from typing import TYPE_CHECKING, Any
 from fenicsmech.compat import ignore_broken_pipes
 from fenicsmech.errors import DescriptionError
 from fenicsmech.live.build import constants
-from fenicsmech.live.job import Job, ended, events
+from fenicsmech.live.job import Job, ended
 from fenicsmech.live.messages import EXPORTS, LARGEST, PER_SECOND, read_message
-from fenicsmech.live.problems import too_long
 from fenicsmech.live.project import LARGEST_PROJECT, MOST_ADDED, Project, example_names, materials
 from fenicsmech.live.schema import Refused
 from fenicsmech.live.script import script
 from fenicsmech.live.session import Session
+from fenicsmech.live.solver_process import SolverProcess
 from fenicsmech.live.stored import StoredResults, user_cache
 from fenicsmech.log import logger
 
@@ -122,7 +122,14 @@ class Server:
         self.token, self.address = secrets.token_urlsafe(24), ""
         self._pages: set[Outbox] = set()
         self._doors: dict[str, float] = {}  # codes, and when they end
-        self._solver = SolverProcess(self._from_solver, self._options)
+        self._solver = SolverProcess(
+            self._options.solver,
+            self._from_solver,
+            restarts=self._options.restarts,
+            within=self._options.within,
+            patience=self._options.patience,
+            longest=self._options.longest_solve,
+        )
         self._solid = Job(self._options.solid, self._tell, self._options.longest_solid)
         self._number, self._pushed = 1, False
         self._kept: dict[tuple[str, int | None], str] = {}
@@ -459,169 +466,6 @@ class Outbox:
             with suppress(ConnectionError, RuntimeError):  # it has just gone
                 await self._page.send_str(f'{{"heard": {heard}, {text[1:]}')
             self._size -= size
-
-
-class SolverProcess:
-    """The solver process, started again when it dies.
-
-    Args:
-        receive: called with every result.
-        options: of restarts.
-    """
-
-    def __init__(self, receive: Callable[[dict[str, Any]], None], options: ServerOptions) -> None:
-        self._receive, self._options = receive, options
-        self._process: asyncio.subprocess.Process | None = None
-        self._reader: asyncio.Task | None = None
-        self._last: Mapping[str, Any] | None = None
-        self._given: tuple[asyncio.subprocess.Process, int] | None = None  # the last task, and who has it
-        self._begun = 0  # the last task that was heard of
-        self._waiting: asyncio.TimerHandle | None = None  # since a task was given that has not begun
-        self._working: asyncio.TimerHandle | None = None  # since a task has begun
-        self._ends: deque[float] = deque(maxlen=options.restarts)
-        self._starting, self._stopped = asyncio.Lock(), False
-
-    @property
-    def pid(self) -> int | None:
-        """Of the process at work."""
-        return None if self._process is None else self._process.pid
-
-    async def start(self) -> None:
-        """Starts it."""
-        async with self._starting:
-            await self._start()
-
-    async def _start(self) -> None:
-        self._process = await asyncio.create_subprocess_exec(
-            *self._options.solver,
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.DEVNULL,
-            limit=2**26,
-        )
-        self._reader = asyncio.create_task(self._read(self._process))
-
-    async def _start_again(self) -> bool:
-        """Starts it where another one was; whether that was possible."""
-        try:
-            await self._start()
-        except OSError as error:  # the machine has no memory or no processes left
-            _log.warning("the solver process cannot be started: %s", error)
-            self._process = None
-            self._receive({"event": "lost"})
-            return False
-        return True
-
-    async def ask(self, task: Mapping[str, Any]) -> None:
-        """Gives it a task, which cancels the one before."""
-        self._last = task
-        async with self._starting:
-            if self._process is None and not self._stopped:  # it was lost; another task may do
-                self._ends.clear()
-                await self._start_again()
-        if task is not self._last:
-            return  # a later one has come
-        await self._give(task)
-
-    async def _give(self, task: Mapping[str, Any]) -> None:
-        await self._write(task)
-        if self._waiting is None and self._process is not None:
-            self._wait()
-
-    async def interrupt(self, number: int) -> None:
-        """Ends the task at work; a process that does not leave it in time is started again."""
-        self._last = {"task": number, "kind": "nothing"}
-        await self._give(self._last)
-
-    async def stop(self) -> None:
-        """Ends the process."""
-        self._stopped = True
-        async with self._starting:
-            process, self._process = self._process, None
-        if self._reader is not None:
-            self._reader.cancel()
-        self._rest()
-        if self._waiting is not None:
-            self._waiting.cancel()
-        if process is not None and process.returncode is None:
-            process.kill()
-            await ended(process)
-
-    def _urge(self) -> None:
-        """Ends a process that has not begun its last task."""
-        self._waiting = None
-        if self._last is not None and self._begun < self._last["task"] and self._process is not None:
-            _log.warning("the solver process does not answer and is started again")
-            with suppress(ProcessLookupError):
-                self._process.kill()
-
-    def _rest(self) -> None:
-        """Ends the time of the task that has begun last."""
-        if self._working is not None:
-            self._working.cancel()
-            self._working = None
-
-    def _overdue(self, task: int) -> None:
-        """Ends a process that does not end a task by itself; the next one is done by another."""
-        if self._last is None or self._last["task"] != task or self._process is None:
-            return
-        _log.warning("the solver process does not end its task and is started again")
-        self._last = None
-        with suppress(ProcessLookupError):
-            self._process.kill()
-        self._receive({"event": "failed", "task": task, **too_long(self._options.longest_solve)})
-
-    def _wait(self) -> None:
-        self._waiting = asyncio.get_running_loop().call_later(self._options.patience, self._urge)
-
-    def _heard(self, task: int) -> None:
-        """Notes a task that has begun; the patience for a later one begins."""
-        if task <= self._begun:
-            return
-        self._begun = task
-        self._rest()
-        longest = self._options.longest_solve + self._options.patience
-        self._working = asyncio.get_running_loop().call_later(longest, self._overdue, task)
-        if self._waiting is not None:
-            self._waiting.cancel()
-            self._waiting = None
-            if self._last is not None and task < self._last["task"]:
-                self._wait()
-
-    async def _write(self, task: Mapping[str, Any]) -> None:
-        process = self._process
-        if process is None or process.stdin is None or self._given == (process, task["task"]):
-            return  # where the start of a process and a task meet, both bring the task
-        self._given = process, task["task"]
-        with suppress(ConnectionError, RuntimeError):  # it has just died, and gets the task when it is back
-            process.stdin.write(json.dumps(task).encode() + b"\n")
-            await process.stdin.drain()
-
-    async def _read(self, process: asyncio.subprocess.Process) -> None:
-        try:
-            async for event in events(process):
-                self._heard(event.get("task", 0))
-                if event["event"] in ("done", "cancelled", "failed") and event["task"] == self._begun:
-                    self._rest()
-                self._receive(event)
-        except Exception:  # nobody waits for this: it would end silently
-            _log.exception("an event of the solver process is not as it should be")
-            with suppress(ProcessLookupError):
-                process.kill()
-        await ended(process)
-        if process is not self._process or self._stopped:
-            return
-        _log.warning("the solver process ended with %s", process.returncode)
-        now = asyncio.get_running_loop().time()
-        if len(self._ends) == self._options.restarts and now - self._ends[0] < self._options.within:
-            self._process = None
-            self._receive({"event": "lost"})
-            return
-        self._ends.append(now)
-        async with self._starting:
-            again = await self._start_again()
-        if again and self._last is not None:
-            await self._write(self._last)
 
 
 def serve(project: Project, *, options: ServerOptions | None = None, browse: bool = True) -> None:
