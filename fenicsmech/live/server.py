@@ -13,6 +13,7 @@ import asyncio
 import json
 import re
 import secrets
+import signal
 import sys
 import webbrowser
 from collections import deque
@@ -478,7 +479,11 @@ def serve(project: Project, *, options: ServerOptions | None = None, browse: boo
     """
 
     async def run() -> None:
-        server = Server(project, options)
+        server, task = Server(project, options), asyncio.current_task()
+        assert task is not None, "it runs in one"
+        with suppress(ValueError, RuntimeError):  # not in the main thread
+            # a plain handler waits for the next event: signals that other threads receive do not wake the loop
+            asyncio.get_running_loop().add_signal_handler(signal.SIGINT, task.cancel)
         await server.start()
         print(f"Live page: {server.address}", flush=True)
         try:
@@ -488,5 +493,5 @@ def serve(project: Project, *, options: ServerOptions | None = None, browse: boo
         finally:
             await server.stop()
 
-    with suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt, asyncio.CancelledError):
         asyncio.run(run())

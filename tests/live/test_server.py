@@ -12,6 +12,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
 from contextlib import suppress
@@ -478,6 +479,30 @@ def test_a_script_serves_its_problem_here_alone_under_a_token_until_it_is_interr
             process.send_signal(signal.SIGINT)
             assert "ended" in process.communicate(timeout=30)[1] and process.returncode == 0
             assert solvers and not any(Path(f"/proc/{own}").exists() for own in solvers)
+        finally:
+            process.kill()
+
+
+@pytest.mark.thorough
+def test_a_page_ends_by_an_interrupt_that_another_thread_receives():
+    struck = """
+import signal, sys, threading
+from fenicsmech.live import example, serve
+
+def strike():
+    sys.stdin.readline()
+    signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+
+threading.Thread(target=strike, daemon=True).start()
+serve(example("truss-finger"), browse=False)
+print("ended")
+"""
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", struck], stdin=pipe, stdout=pipe, text=True) as process:
+        try:
+            assert process.stdout.readline().startswith("Live page: ")
+            time.sleep(1.0)  # until nothing happens but the interrupt
+            assert process.communicate("now\n", timeout=30)[0] == "ended\n" and process.returncode == 0
         finally:
             process.kill()
 
