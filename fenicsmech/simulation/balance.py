@@ -72,9 +72,11 @@ class Balance:
         system.load(state)
         joints, rigid = model.linkage.joints, system.residual(state, control).rigid
         nodal = -system.nodal_loads(state)
+        own = np.zeros(len(nodal))  # of effects, at load factor 1
         if model.elastic.depends_on_load_factor:
-            nodal += state.load_factor * model.elastic.load_factor_residuals()[: len(nodal)]
-        effects, cancelled = self._effect_forces(state)
+            own = model.elastic.load_factor_residuals()[: len(nodal)]
+            nodal += state.load_factor * own
+        effects, cancelled = self._effect_forces(own, state)
         loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum()) + effects
         worst = 0.0
         reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
@@ -101,19 +103,19 @@ class Balance:
             velocity[nodes, : linkage.dim] = motion.at(body, offsets)
         return model.mesh.mesh.comm.allreduce(float(nodal @ velocity.ravel()))
 
-    def _effect_forces(self, state: State) -> tuple[float, float]:
+    def _effect_forces(self, own: np.ndarray, state: State) -> tuple[float, float]:
         """Sum of the sizes of all forces of effects that grow with the load factor; the same of what balances.
 
-        Those on a flexible link count by their sum: what balances on each link, as pressure all around it does, works
-        along no motion that deforms none.
+        Those on a flexible link, ``own``, count by their sum: what balances on each link, as pressure all around it
+        does, works along no motion that deforms none.
         """
-        model, total, nodal = self._model, 0.0, np.zeros((0, self._model.linkage.dim))
-        if model.elastic.depends_on_load_factor:
-            owned, links = model.interfaces.owned, len(model.mechanism.flexible_links)
-            nodal = model.elastic.load_factor_residuals()[: owned * model.interfaces.block].reshape(owned, -1)
-            sums = np.array([np.bincount(model.node_link[:owned], part, minlength=links) for part in nodal.T])
-            total += float(np.abs(model.mesh.mesh.comm.allreduce(sums, op=MPI.SUM)).sum())
-        cancelled = model.mesh.mesh.comm.allreduce(float(np.abs(nodal).sum()))
+        model, comm = self._model, self._model.mesh.mesh.comm
+        link, links = model.node_link[: model.interfaces.owned], len(model.mechanism.flexible_links)
+        sums = np.array(
+            [np.bincount(link, part, minlength=links) for part in own.reshape(len(link), model.interfaces.block).T]
+        )
+        total = float(np.abs(comm.allreduce(sums, op=MPI.SUM)).sum())
+        cancelled = comm.allreduce(float(np.abs(own).sum()))
         for potential in model.potentials:
             if not potential.holds:
                 slope = potential.gradient(state.poses).reshape(len(potential.bodies), -1)
