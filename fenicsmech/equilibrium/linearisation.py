@@ -29,6 +29,7 @@ from fenicsmech.equilibrium.system import EquilibriumSystem, Residual
 from fenicsmech.errors import OutOfMemoryError
 
 _ACCURACY = 1e-10  # relative error that iterative solvers may leave
+_LOST = 1e-2  # likewise of a solution, from which on it counts as rounding
 
 
 @dataclass(frozen=True)
@@ -273,6 +274,22 @@ class Linearisation:
         """r, the right-hand side of the rate."""
         self._turn()
         return self.control.rate(self._system, self.state)
+
+    @property
+    def drowns_modes(self) -> bool:
+        """Whether rounding of K, 1e-16 of the stiffest links, exceeds what resists some motion in the rate x,
+
+            |K⁻¹ K x − x| > 1e-2 |x|,
+
+        or leaves a pivot that counts as zero.
+        """
+        x = self.rate()
+        if self._linear.inertia().zero > 0:
+            return True
+        image = x.duplicate()
+        self._system.kkt.matrix().mult(x, image)
+        lost = self.solve(image) - x
+        return not lost.norm() <= _LOST * x.norm()
 
     def motor_rate(self, direction: np.ndarray) -> PETSc.Vec:
         """The right-hand side of the rate with motors that move by ``direction``, (connections,)."""

@@ -164,7 +164,6 @@ class NewtonSolver(EquilibriumSolver):
         # the last such step
         last: _Began = None
         residuals, shift, any_stability, predicted, norm = [], least, True, False, math.inf
-        singular = 0  # of the last iterations, those with a null pivot
         most = self.factorisations + options.factorisations
         contact = system.contact
         if contact is not None:
@@ -190,8 +189,7 @@ class NewtonSolver(EquilibriumSolver):
             near = path or (any_stability and (diverged is not None or residuals[-1] < options.near))
             predicted = last is not None and not near
             self.assemble(state, control, residual, last if predicted else None, contact)
-            x, shift, null = self._direction(residual, least, last=shift, any_stability=near)
-            singular = singular + 1 if null else 0
+            x, shift = self._direction(residual, least, last=shift, any_stability=near)
             plane = self.plane(state, control, residual)
             if contact is not None:
                 x = self._with_contact(contact, x, residual, plane)
@@ -208,7 +206,7 @@ class NewtonSolver(EquilibriumSolver):
             try:
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
-                return self.accept_best(*best, control, residuals, _explained(failure, singular))
+                return self.accept_best(*best, control, residuals, failure)
             last = (before, -length * motion) if self._predicts_stress else None
             close = self.relative(residual) < options.near
             if near and not (close and residual.norm <= norm) and not self.converged(residual, norm):
@@ -235,7 +233,7 @@ class NewtonSolver(EquilibriumSolver):
             if not_better > options.watchdog and not line_search:
                 state, line_search, last = best[0], True, None
                 residual, norm = self._again(state, control), math.inf
-        return self.accept_best(*best, control, residuals, _explained(self.exhausted(residuals, iteration), singular))
+        return self.accept_best(*best, control, residuals, self.exhausted(residuals, iteration))
 
     def _without_factor(
         self, start: State, control: Control, residual: Residual
@@ -294,27 +292,23 @@ class NewtonSolver(EquilibriumSolver):
 
     def _direction(
         self, residual: Residual, least: float, *, last: float, any_stability: bool
-    ) -> tuple[PETSc.Vec, float, bool]:
+    ) -> tuple[PETSc.Vec, float]:
         """x with K x the residual, and δ, raised until the inertia guarantees descent unless ``any_stability`` will do.
-
-        Also returns δ, and whether K with the ``least`` δ has pivots that are zero but for rounding.
 
         δ = ``least`` is tried first; then a third of the ``last`` successful one, and eight times that, …
         """
-        shift, following, null = least, _LEAST_SHIFT, False
+        shift, following = least, _LEAST_SHIFT
         if last > least:
             following = max(last / 3.0, 8.0 * least, _FLOOR_OF_SHIFTS)
         for _ in range(self.options.shifts):
             factored = self.factor(shift, least=shift == least)
             x = self.try_solve(residual.vector, self.step_accuracy(residual)) if factored else None
-            if x is not None and shift == least:
-                null = self.linear.known_inertia().zero > 0
             if x is not None and (any_stability or self.descends()):
                 break
             shift, following = following, 8.0 * following
         else:
             raise NotConverged("no shift of the KKT matrix gives a direction of descent", 0)
-        return x, shift, null
+        return x, shift
 
     def _path_step(self, state: State, control: Control, step: Step, residuals: list[float]) -> tuple[State, Residual]:
         """The whole step across a path, unless it is too large or diverges: then a shorter one along it is due."""
@@ -536,15 +530,3 @@ class _Held:
     state: State
     residuals: tuple[float, ...]
     iterations: int
-
-
-def _explained(failure: NotConverged, singular: int) -> NotConverged:
-    """The ``failure`` with a cause it may have where the last ``singular`` KKT matrices have null pivots, at least two.
-
-    Steps lose their digits then. One null pivot is that of a limit or bifurcation point as well.
-    """
-    if singular < 2:
-        return failure
-    cause = "less than the rounding of the stiffest link may resist some motion"
-    remedy = "if so, stiffen the soft part or soften the stiff one"
-    return NotConverged(f"{failure.reason}; {cause}: {remedy}", failure.iterations)

@@ -207,7 +207,8 @@ class EquilibriumSolver(ABC):
 
             r · x ≤ 1e-4 forces |x|,     K x = r.
 
-        Where stiff links turn, their rounding may be more of the forces, but along x only 1e-6 of them.
+        Where stiff links turn, their rounding may be more of the forces, but along x only 1e-6 of them. Where that of K
+        drowns what resists, x tells nothing.
         """
         near_singular = residual.norm <= self.roundoff(residual)
         if not (near_singular or residual.norm <= self.rounding(residual)) or not math.isfinite(residual.norm):
@@ -217,7 +218,7 @@ class EquilibriumSolver(ABC):
         motion = self.system.size(self.system.unknowns.step(x))
         work = abs(x.dot(at.residual.vector)) / self.system.unknowns.unit
         share = _ROUNDING if near_singular else _TURNED
-        if not (motion <= _NO_MOTION or work <= share * at.residual.forces * motion):
+        if not (motion <= _NO_MOTION or work <= share * at.residual.forces * motion) or at.drowns_modes:
             raise failure
         residuals = [*residuals[: failure.iterations], self.relative(at.residual)]
         return at.point(residuals, failure.iterations, tolerance=STEP)

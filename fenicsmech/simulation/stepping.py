@@ -469,6 +469,11 @@ class CurveStepper:
         elif self.freedom.zero_energy:
             names = ", ".join(map(repr, self.freedom.zero_energy))
             otherwise = f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
+        elif self._links_below_rounding(last.state if last else self.unloaded):
+            otherwise = (
+                "What resists some motion is less than the rounding of the stiffest link: "
+                "make links rigid that hardly bend, or soft ones stiffer"
+            )
         return EquilibriumError(where, problem, otherwise, last=last, frames=self.frames)
 
     def _last(self, failure: LoadStepsFailed) -> Frame | None:
@@ -485,6 +490,13 @@ class CurveStepper:
                 return False
             rate[joints.columns[point.body]] += direction @ point.gradient(state.poses)
         return is_held(joints, state.poses, state.motors, rate, self._system.rigid_rows)
+
+    def _links_below_rounding(self, state: State) -> bool:
+        """Whether soft links resist less than the rounding of stiff ones."""
+        try:
+            return self.solver.linearise(state, LoadControl(state.force)).drowns_modes
+        except NotConverged:
+            return False
 
     @cached_property
     def _springs_below_rounding(self) -> bool:

@@ -138,22 +138,8 @@ def test_failure_names_a_link_softer_than_the_rounding_of_the_one_it_carries_as_
     mechanism.weld(feather, anvil, at=(40, 0), interface_radius=1.0)
     push = mechanism.force(on=anvil, at=(80, 0), direction=(0, -1))
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", order=1, size=2.0, comm=MPI.COMM_SELF)
-    with pytest.raises(
-        fm.EquilibriumError, match="link may resist some motion: if so, stiffen the soft part or soften"
-    ):
+    with pytest.raises(fm.EquilibriumError, match="less than the rounding of the stiffest link: make links rigid"):
         simulation.load_displacement(push, forces=[1e-14])
-
-
-@pytest.mark.parametrize(("null", "named"), [([1, 1, 0], False), ([0, 0, 1], False), ([0, 1, 1], True)])
-def test_rounding_is_named_as_a_cause_only_where_the_last_two_matrices_have_null_pivots(null, named, monkeypatch):
-    # one of them may be at a limit point
-    simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=3))
-    solver, rest = simulation.solver(push), simulation.load_displacement(push, forces=[0.0]).frames[0].state
-    direction, found = solver._direction, iter(null)
-    monkeypatch.setattr(solver, "_direction", lambda *args, **options: (*direction(*args, **options)[:2], next(found)))
-    with pytest.raises(NotConverged, match="after 3 iterations") as caught:
-        solver.solve(rest, LoadControl(20.0))
-    assert ("rounding of the stiffest link" in str(caught.value)) == named
 
 
 @pytest.mark.parametrize(("before", "steady"), [(1.0, True), (5.0, False), (0.2, False)])
