@@ -48,7 +48,9 @@ class ArcSteps:
 
     Attributes:
         first: length of the first step; 1 reaches ``until`` if the mechanism is linear.
-        largest: the longest step, likewise, in force and in the displacement of its point.
+        largest: the longest step, likewise, in force and in the displacement of its point; where the followed value is
+            beyond that linear reach, over its present size: links that come to touch, or to be pulled straight, may
+            stiffen a mechanism by orders of magnitude.
         smallest: the shortest step, likewise; if even that fails, the path ends with an error.
         motion: largest motion of a step, in lengths of the mechanism or rad.
         tolerance: of the location of limit points and bifurcations, over the step they lie in.
@@ -350,8 +352,9 @@ class ArcLengthStepper(Stepper):
 
     def _longest(self, point: EquilibriumPoint) -> float:
         """The longest arc within the limits on the value, its conjugate and motions."""
+        size = max(self.metric.value, abs(self.value(point)))
         rates = (
-            abs(self.value_rate(point)) / (self.steps.largest * self.metric.value),
+            abs(self.value_rate(point)) / (self.steps.largest * size),
             abs(point.conjugate_rate) / (self.steps.largest * self._conjugate_reference),
             self.system.size(point.tangent) / self.steps.motion,
         )

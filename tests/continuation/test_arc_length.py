@@ -136,3 +136,22 @@ def test_paths_end_at_the_prescribed_value_however_rounding_scatters_their_point
     reached, wanted = (last.force, until.force) if until.force else (last.displacement, until.displacement)
     assert (reached,) == pytest.approx(wanted, rel=1e-12)
     assert last.force == pytest.approx(toggle.force(last.outputs[case.sunk]), abs=1e-8)
+
+
+def test_path_of_a_mechanism_that_stiffens_a_hundredfold_takes_steps_by_the_size_of_its_force():
+    # a crank with a spring turns towards a force at 45 degrees, F L sin(45° − θ) = k θ
+    length, stiffness, reach = 20.0, 3.0, 1.0 - np.sqrt(0.5)
+    mechanism = fm.Mechanism("crank")
+    base, crank = mechanism.rigid("base", fixed=True), mechanism.rigid("crank")
+    ribbon = mechanism.flexible(
+        "ribbon", fm.strip([(0, 0), (0, 10)], thickness=1.0, depth=1.0), fm.Material("steel", 2e5, 0.3)
+    )
+    pivot = mechanism.revolute(base, crank, at=(0, 0))
+    mechanism.weld(crank, ribbon, at=(0, 0.5), interface_radius=0.45)
+    pull = mechanism.force(on=crank, at=(length, 0), direction=(1, 1))
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(pivot, stiffness)])
+    simulation = fm.Simulation(scene, space="plane-stress", order=1, size=1.0, comm=MPI.COMM_SELF)
+    curve = simulation.follow(pull, until=fm.Until(displacement=0.999 * reach * length))
+    assert len(curve.frames) < 200
+    left = np.arccos(1.0 - 0.001 * reach)
+    assert curve.frames[-1].force == pytest.approx(stiffness * (np.pi / 4 - left) / (length * np.sin(left)), rel=1e-6)

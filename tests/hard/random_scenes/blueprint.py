@@ -264,10 +264,10 @@ class Built:
         part, shared = self._loads(blueprint)
         return self.simulation.load_displacement(part, **{blueprint.control: blueprint.samples}, **shared)
 
-    def follow(self, blueprint: Blueprint, until: fm.Until) -> fm.Curve:
+    def follow(self, blueprint: Blueprint, until: fm.Until, steps: fm.ArcSteps | None = None) -> fm.Curve:
         """A path of the blueprint's forces."""
         part, shared = self._loads(blueprint)
-        return self.simulation.follow(part, until=until, **shared)
+        return self.simulation.follow(part, until=until, steps=steps, **shared)
 
     def _loads(self, blueprint: Blueprint) -> tuple[Force | fm.ForceGroup, dict]:
         """The forces that change, and options of every curve."""

@@ -5,7 +5,8 @@ Joints at pins x₀ on the ground, x₁, … of a chain of rigid links keep a po
 
     |P − x₀| ≤ ρ = |x₁ − x₀| + … + |P − xₙ|,
 
-so that it travels by no more than d · (x₀ − P) ± ρ along d, which is exact.
+so that it travels by no more than d · (x₀ − P) ± ρ along d, which is exact. A hinge at x₀ of axis a leaves x₁ a circle
+about it, and P no more than |d × a| times its radius in place of |x₁ − x₀|, about its centre.
 
 A flexible link is replaced by strings between its joints and the point of the force, s the length of link between the
 ends of a string and d their distance: nothing resists while d < s. Rigid links, joints and motors are as they are;
@@ -22,7 +23,7 @@ only if it is the global one, which nothing here proves.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -49,6 +50,21 @@ class _String:
     length: float
 
 
+@dataclass(frozen=True)
+class _Chain:
+    """Where rigid links let a point get: within ``ball`` of a circle about an ``axis`` through ``centre``."""
+
+    centre: np.ndarray
+    ball: float = 0.0
+    circle: float = 0.0
+    axis: np.ndarray = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))
+
+    def reach(self, direction: np.ndarray) -> float:
+        """How far from the centre along a ``direction``, of any length, at most."""
+        across = np.linalg.norm(np.cross(direction, self.axis))
+        return self.ball * float(np.linalg.norm(direction)) + self.circle * float(across)
+
+
 def beyond_chains(scene: Blueprint, travel: float) -> float:
     """How far a ``travel`` of the forces' points from the drawn configuration is beyond the reach of rigid links on the
     ground, over the mechanism's length; −∞ where flexible links, slides or joints that give way are in between.
@@ -60,11 +76,10 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
     stiff = [joint for joint in scene.joints if joint.name not in soft]
     welds = {joint.name for joint in stiff if joint.kind == "weld" or joint.name in still}
 
-    def chains(link: LinkPlan, point: np.ndarray, passed: tuple[str, ...]) -> Iterator[tuple[np.ndarray, float]]:
-        """x₀ and ρ of the chains that end at a ``point`` of a link."""
+    def chains(link: LinkPlan, point: np.ndarray, passed: tuple[str, ...]) -> Iterator[_Chain]:
+        """Those that end at a ``point`` of a link."""
         if link.fixed:
-            yield point, 0.0
-        if link.fixed:
+            yield _Chain(point)
             return
         for joint in stiff:
             pinned = joint.kind != "prismatic" or joint.name in welds
@@ -74,17 +89,23 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
                 radius = joint.interface if isinstance(joint.interface, float) else 0.0  # clamps are not turned about
                 if link.centreline and not arm < _WITHIN * radius:
                     continue
+                if other.fixed and joint.kind == "revolute" and joint.name not in welds:
+                    axis = np.array(joint.axis or (0.0, 0.0, 1.0))
+                    axis /= np.linalg.norm(axis)
+                    centre = pin + axis * (axis @ (point - pin))
+                    yield _Chain(centre, circle=float(np.linalg.norm(point - centre)), axis=axis)
+                    continue
                 at, own = (point, 0.0) if joint.name in welds else (pin, arm)
-                for ground, reach in chains(other, at, (*passed, joint.name)):
-                    yield ground, reach + own
+                for chain in chains(other, at, (*passed, joint.name)):
+                    yield replace(chain, ball=chain.ball + own)
 
     least = most = 0.0
     for ratio, force in zip(scene.ratios, scene.forces, strict=False):
         point, direction = _in_space(force.at), _in_space(force.direction)
         direction *= ratio / np.linalg.norm(direction)
         found = [
-            (direction @ (ground - point), abs(ratio) * reach)
-            for ground, reach in chains(scene.link(force.on), point, ())
+            (direction @ (chain.centre - point), chain.reach(direction))
+            for chain in chains(scene.link(force.on), point, ())
         ]
         least += max((middle - reach for middle, reach in found), default=-np.inf)
         most += min((middle + reach for middle, reach in found), default=np.inf)

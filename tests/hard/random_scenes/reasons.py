@@ -7,7 +7,7 @@ the others from the last equilibrium, which must be one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,9 @@ from .thresholds import THRESHOLDS
 from .unstrained_check import unstrained_motions
 
 HELD = "the point cannot move that way"
+
+# where a path turns shows at a few points of it
+_LONG = fm.ArcSteps(first=0.1, largest=0.25, iterations=8)
 
 
 @dataclass(frozen=True)
@@ -240,24 +243,65 @@ def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError
         reached = (last.force if blueprint.control == "forces" else last.displacement) / asked
     name = blueprint.control.removesuffix("s")
     until = fm.Until(**{name: asked}, frames=THRESHOLDS.followed)
-    try:
-        frames = built.follow(blueprint, until).frames
-    except fm.EquilibriumError as error:
-        frames = error.frames
+    frames = _frames(lambda: built.follow(blueprint, until, _LONG))
     shares = [getattr(frame, name) / asked for frame in frames]
-    turn = next((k for k in range(1, len(shares) - 1) if shares[k - 1] < shares[k] > shares[k + 1]), None)
-    if turn is None or shares[turn] >= 1.0 or reached < THRESHOLDS.turned * shares[turn]:
+    return _turn(frames, shares, reached, lambda k: _proven(blueprint, built, frames[k]))
+
+
+def turned_back_by_motors(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """The same of the path along which motors take a mechanism from the drawing, where nothing else acts."""
+    ways = [motor for motor in blueprint.motors if motor.position]
+    if failure.last is None or len(ways) != 1 or "of their way" not in failure.problem or _preloaded(blueprint):
         return None
-    if not all(_proven(blueprint, built, frame) for frame in frames[turn - 1 : turn + 2]):
+    (way,) = ways
+    potential = Potential.of(blueprint, built.simulation)
+    places = potential.places(failure.last.state.poses)
+    reached = float(np.real(potential.closure.coordinate(blueprint.joint(way.joint), places))) / way.position
+    until = fm.Until(position=way.position, frames=THRESHOLDS.followed)
+    frames = _frames(lambda: built.simulation.follow(built.motors[way.joint], until=until, steps=_LONG))
+    shares = [frame.displacement / way.position for frame in frames]
+
+    def proven(frame: fm.Frame, share: float) -> bool:
+        others = [motor for motor in blueprint.motors if motor is not way]
+        there = replace(blueprint, motors=(*others, replace(way, position=share * way.position)))
+        return _proven(there, built, replace(frame, force=0.0))
+
+    if not proven(failure.last, reached):
+        return None
+    return _turn(frames, shares, reached, lambda k: proven(frames[k], shares[k]))
+
+
+def _frames(follow: Callable[[], fm.Curve]) -> tuple[fm.Frame, ...]:
+    """Those of a path, also of one that ends early."""
+    try:
+        return follow().frames
+    except fm.EquilibriumError as error:
+        return error.frames
+
+
+def _turn(
+    frames: Sequence[fm.Frame], shares: Sequence[float], reached: float, proven: Callable[[int], bool]
+) -> Excuse | None:
+    """The excuse that a path turns back at a share of its way before the end, where a curve ``reached`` that."""
+    # frames at critical points may be all but the same
+    apart = [k for k in range(len(shares)) if not k or abs(shares[k] - shares[k - 1]) > THRESHOLDS.reached]
+    turns = [
+        three
+        for three in zip(apart, apart[1:], apart[2:], strict=False)
+        if shares[three[0]] < shares[three[1]] > shares[three[2]]
+    ]
+    if not turns:
+        return None
+    turn = turns[0][1]
+    if shares[turn] >= 1.0 or reached < THRESHOLDS.turned * shares[turn] or not all(map(proven, turns[0])):
         return None
     return Excuse("a path of equilibria turns back", f"share of what is asked for {shares[turn]:.1e}")
 
 
 def _constant_forces(blueprint: Blueprint) -> Blueprint | None:
     """The scene whose constant forces are those that change, up to what they are; None if other loads are constant."""
-    for plan in blueprint.effects:
-        if not isinstance(plan, CompliancePlan) and not (isinstance(plan, SpringPlan) and not plan.rest):
-            return None
+    if _preloaded(blueprint):
+        return None
     forces = blueprint.forces[len(blueprint.ratios) :]
     sizes = tuple(force.magnitude for force in forces)
     if not forces:
@@ -267,8 +311,16 @@ def _constant_forces(blueprint: Blueprint) -> Blueprint | None:
     return replace(blueprint, forces=forces, ratios=sizes, control="forces", samples=(1.0,))
 
 
+def _preloaded(blueprint: Blueprint) -> bool:
+    """Whether effects load the scene, or may come to."""
+    return not all(
+        isinstance(plan, CompliancePlan) or (isinstance(plan, SpringPlan) and not plan.rest)
+        for plan in blueprint.effects
+    )
+
+
 _Reason = Callable[[Blueprint, Built, fm.EquilibriumError], Excuse | None]
-_BY_GEOMETRY: tuple[_Reason, ...] = (immobile, adrift, drowned, unheard)
+_BY_GEOMETRY: tuple[_Reason, ...] = (immobile, adrift, drowned, unheard, turned_back_by_motors)
 _BY_STATE: tuple[_Reason, ...] = (at_limit, out_of_reach, inverted, overstrained, turned_back)
 
 

@@ -41,7 +41,8 @@ class SceneResult:
         outcome: "equilibrium", "equilibrium to rounding", "designed: …", "refused", "true: …" or "wrong: …".
         detail: the error, or the figures.
         seconds: wall-clock time.
-        cpu: processor time, that of compilers included.
+        cpu: processor time, that of compilers included; without that of the judge, but for designs, which it checks by
+            a second start.
         frames: how many equilibria were checked.
         residual: the largest relative one.
         iterations: of Newton's method, on the way to all frames.
@@ -82,6 +83,7 @@ class _Verdict:
     iterations: int = 0
     unchecked: str = ""
     proof: str = ""
+    cpu: float = 0.0
 
 
 def judge(seed: int, *, quick: bool = False) -> SceneResult:
@@ -97,7 +99,8 @@ def judge(seed: int, *, quick: bool = False) -> SceneResult:
     else:
         blueprint = random_scene(seed)
         scene, verdict = blueprint.summary, judge_sound(blueprint.coarsened() if quick else blueprint)
-    return SceneResult(seed, scene, seconds=time.perf_counter() - start, cpu=_cpu() - used, **asdict(verdict))
+    verdict = replace(verdict, cpu=verdict.cpu or _cpu() - used)
+    return SceneResult(seed, scene, seconds=time.perf_counter() - start, **asdict(verdict))
 
 
 def _cpu() -> float:
@@ -136,7 +139,7 @@ def _judge_design(seed: int) -> tuple[str, _Verdict]:
 
 def judge_sound(blueprint: Blueprint) -> _Verdict:
     """Outcome of a scene that makes sense."""
-    frames, failure, built = (), None, None
+    frames, failure, built, used = (), None, None, _cpu()
     try:
         built = build(blueprint)
         curve = built.curve(blueprint)
@@ -147,7 +150,7 @@ def judge_sound(blueprint: Blueprint) -> _Verdict:
         failure = error
     except Exception as error:
         return _Verdict(f"wrong: {type(error).__name__} escaped", str(error))
-    verdict = _Verdict("")
+    verdict, used = _Verdict(""), _cpu() - used
     if frames or failure is None:
         verdict = judge_frames(blueprint, built, frames, ended=failure is None)
     if failure is not None and not verdict.outcome.startswith("wrong"):
@@ -157,7 +160,7 @@ def judge_sound(blueprint: Blueprint) -> _Verdict:
             outcome = f"true: {type(failure).__name__}, {excuse.reason}"
             verdict = replace(verdict, proof=excuse.proof)
         verdict = replace(verdict, outcome=outcome, detail=str(failure))
-    return verdict
+    return replace(verdict, cpu=used)
 
 
 def judge_frames(blueprint: Blueprint, built: Built, frames: Sequence[fm.Frame], *, ended: bool) -> _Verdict:

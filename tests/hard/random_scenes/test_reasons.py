@@ -24,7 +24,16 @@ from .blueprint import (
 from .designs import UNMET
 from .potential import Potential
 from .reach import beyond_chains, least_stretch
-from .reasons import _constant_forces, adrift, inverted, out_of_reach, overstrained, turned_back, unheard
+from .reasons import (
+    _constant_forces,
+    adrift,
+    inverted,
+    out_of_reach,
+    overstrained,
+    turned_back,
+    turned_back_by_motors,
+    unheard,
+)
 from .residual_check import check, fault
 from .scene_result import ROUNDED, SceneResult
 from .stability_check import stiffness_left
@@ -170,6 +179,15 @@ def test_rigid_links_reach_no_farther_than_they_are_long_and_flexible_ones_and_s
         assert beyond_chains(other, 1e3) == -np.inf
 
 
+def test_a_point_on_a_hinged_link_in_space_stays_on_a_circle():
+    # the hinge's axis is 30 degrees off the force: the crank's end is 6 from its axis, and 5 above its pin
+    axis, arm = np.array((np.sqrt(3.0), 0.0, 1.0)) / 2.0, np.array((0.0, 6.0, 0.0))
+    hinge = JointPlan("A", "revolute", "base", "crank", (0.0, 0.0, 0.0), axis=tuple(axis))
+    push = ForcePlan("load", "crank", tuple(arm + 5.0 * axis), (1.0, 0.0, 0.0))
+    scene = replace(hung(), joints=(hinge, *hung().joints[1:]), forces=(push,), space="3d")
+    assert [beyond_chains(scene, travel) > 0.0 for travel in (-3.01, -2.99, 2.99, 3.01)] == [True, False, False, True]
+
+
 def test_a_point_in_an_interface_turns_about_the_pin_of_a_crank_that_its_motor_holds():
     # 1 to the right of the pin at (0, 10), pushed up
     off = replace(hung(), forces=(ForcePlan("load", "strip", (1.0, 10.0), (0.0, 1.0)),))
@@ -232,6 +250,29 @@ def test_a_path_turns_back_between_equilibria_and_before_the_load(raised, monkey
     assert not turned([low, high, middle], last=low)  # the curve did not get there
     assert not turned([low, high, middle], replace(scene, samples=(0.2,)))
     assert not turned([low, high, middle], replace(asked, control="path"))
+
+
+def test_the_way_of_a_motor_turns_back_between_equilibria(monkeypatch):
+    scene = replace(hung(), motors=(MotorPlan("A", 0.5),))
+    built = build(scene)
+    motor = built.motors["A"]
+    low, middle, high = (
+        built.simulation.follow(motor, until=fm.Until(position=position)).frames[-1] for position in (0.1, 0.15, 0.2)
+    )
+    torn = replace(high, state=replace(high.state, u=1.01 * high.state.u))
+
+    def turned(frames: list[fm.Frame], last: fm.Frame = high, scene: Blueprint = scene) -> bool:
+        monkeypatch.setattr(built.simulation, "follow", lambda *_, **options: SimpleNamespace(frames=frames))
+        failure = fm.EquilibriumError("motors", "no equilibrium beyond 40% of their way", "Give up", last=last)
+        return turned_back_by_motors(scene, built, failure) is not None
+
+    assert turned([low, high, middle])
+    assert turned([low, high, high, middle])  # a critical point
+    assert not turned([low, middle, high])
+    assert not turned([low, torn, middle])
+    assert not turned([low, high, middle], last=torn)
+    assert not turned([low, high, middle], last=low)  # the motors did not get there
+    assert not turned([low, high, middle], scene=replace(scene, effects=(SpringPlan("A", 5.0, 0.2),)))
 
 
 def test_constant_forces_alone_are_followed():

@@ -82,7 +82,7 @@ class Thresholds:
     inverted: float = 0.1
     strained: float = 2.0
     strained_share: float = 0.05
-    followed: int = 150
+    followed: int = 200
     turned: float = 0.9
     drowned: float = 1e-14
     unheard: float = 1e-16
