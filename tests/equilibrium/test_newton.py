@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.continuation import ConstantPredictor, HermitePredictor, TangentPredictor
-from fenicsmech.equilibrium import LoadControl, NotConverged
+from fenicsmech.equilibrium import LoadControl
 
 from ..simulation.clamped import cantilever
 from .finger import RUBBER, finger
