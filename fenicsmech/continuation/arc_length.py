@@ -9,7 +9,9 @@ links: with the default lengths, seventeen tries of each at most. A try is one s
 Where other points come to touch an obstacle, the stiffness jumps and the path has a corner. What tells it from a bend
 and from a jump to another branch is the step bisected towards the larger turn: a bend turns less in each half, and the
 ends of a jump stay apart, while a corner keeps its angle however near its ends are. Both tangents then point along the
-chord across it.
+chord across it. A path may turn back at a corner, as where a link that only an obstacle holds comes off it: no
+equilibrium lies ahead then, however short the step, and the path goes on along the rate against which it would come
+back.
 
 Sources: Riks (doi:10.1016/0020-7683(79)90081-7), Crisfield (doi:10.1016/0045-7949(81)90108-5).
 """
@@ -299,6 +301,10 @@ class ArcLengthStepper(Stepper):
                 reason = str(failure)
             self.length *= 0.5
             if self.length < steps.smallest * min(longest / steps.largest, 1.0):
+                if (found := self._back_from_corner(steps.tolerance * longest)) is not None:
+                    self._accept(found, self.metric.norm(self.chord(point, found)))
+                    self.length = steps.first
+                    return found
                 if not self._turn_links():
                     raise NotConverged(reason)
                 self.length = longest
@@ -326,6 +332,25 @@ class ArcLengthStepper(Stepper):
                 low, near = found, middle
         apart = self.metric.norm(self.chord(low, high)) / self.metric.norm(self.chord(start, end))
         return steps.largest_turn < self._turn(low, high) < steps.largest_corner and apart <= steps.gap
+
+    def _back_from_corner(self, length: float) -> EquilibriumPoint | None:
+        """The point ``length`` beyond a corner just ahead at which the path turns by more than π/2; None if none is.
+
+        Nothing lies ahead of such a corner. With the points that touch beyond it the path would go on along some y′
+        there, which leads back among those that touch before it: so it goes on along −y′.
+        """
+        point = self._points[-1]
+        ahead = self.system.moved(point.state, point.tangent.scaled(length))
+        if not self._others_touch(point.touching, self.system.touching(ahead)):
+            return None
+        plane = ArcLengthControl(0.0, self.metric, ahead, point.tangent, self.local_parameter(point))
+        try:
+            back = self.metric.unit(self.solver.linearise(ahead, plane).point((0.0,), 0).tangent).scaled(-1.0)
+            found = self.correct(self.system.moved(point.state, back.scaled(length)), back, point)
+        except NotConverged:
+            return None
+        straight = self.metric.dot(back, found.tangent) >= math.cos(self.steps.turn)
+        return found if straight and self._others_touch(point.touching, found.touching) else None
 
     def _jumps(self, start: EquilibriumPoint, end: EquilibriumPoint) -> bool:
         """Whether another path that comes near, as beside an imperfect bifurcation, is taken in the step.

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.continuation import ArcLengthStepper, Finish
-from fenicsmech.equilibrium import EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
+from fenicsmech.equilibrium import ArcLengthControl, EquilibriumPoint, LoadControl, NotConverged, Stability, State, Step
 
 REFUSED = "bends too sharply, or another one is too near"
 SHARP = math.radians(75.0)  # more than steps along smooth paths may turn
@@ -26,12 +26,14 @@ class Plate:
         until: the displacement up to which solves end on the first path; beyond, on the other one.
         modes: unstable ones of each path.
         lost: the displacement beyond which tangents are not finite.
+        wall: the displacement beyond which something touches.
     """
 
     paths: list[tuple[np.ndarray, np.ndarray]]
     until: float = math.inf
     modes: tuple[int, ...] = (0, 0)
     lost: float = math.inf
+    wall: float = math.inf
     potentials, comm, ideal_compliance = (), MPI.COMM_SELF, 0.0
 
     turning = None  # no other steps
@@ -60,6 +62,9 @@ class Plate:
     def moved(self, state: State, step: Step) -> State:
         return State(state.u + step.u, state.poses, state.multipliers, state.force + step.force, state.motors)
 
+    def touching(self, state: State) -> np.ndarray:
+        return state.u > self.wall
+
     # -- a solver in closed form ----------------------------------------------------------------------------------
 
     def point(self, place: np.ndarray, way: np.ndarray, touches: bool, control, modes: int) -> EquilibriumPoint:
@@ -70,21 +75,25 @@ class Plate:
 
     def linearise(self, state: State, control: LoadControl):
         places, touches = self.paths[0]
-        way = (places[1] - places[0]) / (places[1] - places[0])[1]
-        found = self.point(places[0], way, bool(touches[0]), control, self.modes[0])
+        k = int(np.flatnonzero(touches == self.touching(state)[0])[0])
+        way = (places[k + 1] - places[k]) / (places[k + 1] - places[k])[1]
+        if isinstance(control, ArcLengthControl) and way[0] * control.normal.u[0] < 0.0:
+            way = -way
+        found = self.point(places[k], way, bool(touches[k]), control, self.modes[0])
         return type("At", (), {"residual": None, "point": staticmethod(lambda residuals, iterations: found)})
 
     def relative(self, residual: None) -> float:
         return 0.0
 
     def solve(self, guess: State, control) -> EquilibriumPoint:
-        """Where the plane through the guess meets the path."""
+        """Where the plane through the guess meets the path, nearest to it."""
         metric, normal = control.metric, control.normal
         on = int(guess.u[0] > self.until)
         places, touches = self.paths[on]
         scale = np.array([1.0 / metric.motion**2, 1.0 / metric.value**2])
         across = np.array([normal.u[0], normal.force]) * scale
         heights = (places - [guess.u[0], guess.force]) @ across
+        met = list[tuple[float, EquilibriumPoint]]()
         for k in range(len(places) - 1):
             if heights[k] * heights[k + 1] <= 0.0 and heights[k] != heights[k + 1]:
                 part = heights[k] / (heights[k] - heights[k + 1])
@@ -92,8 +101,11 @@ class Plate:
                 way = way / math.sqrt(way**2 @ scale) * (1.0 if way @ across > 0.0 else -1.0)
                 place = places[k] + part * (places[k + 1] - places[k])
                 way = way * (math.nan if place[0] > self.lost else 1.0)
-                return self.point(place, way, bool(touches[k]), control, self.modes[on])
-        raise NotConverged("the plane meets no path", 1)
+                away = float((place - [guess.u[0], guess.force]) ** 2 @ scale)
+                met.append((away, self.point(place, way, bool(touches[k]), control, self.modes[on])))
+        if not met:
+            raise NotConverged("the plane meets no path", 1)
+        return min(met, key=lambda found: found[0])[1]
 
 
 def stepper(plate: Plate, **options: float) -> ArcLengthStepper:
@@ -125,6 +137,14 @@ def test_a_corner_where_something_touches_is_passed_in_whole_steps():
     path = stepper(Plate([corner(math.radians(60.0))]))
     places = walked(path, 1.0)
     assert len(places) < 60 and places[-1][1] == pytest.approx(1.0)
+
+
+def test_a_path_that_turns_back_at_a_corner_goes_on_beyond_it():
+    path = stepper(Plate([corner(math.radians(130.0))], wall=0.303))
+    places = walked(path, 0.6)
+    assert len(places) < 150 and places[-1][1] == pytest.approx(0.6)
+    back = places[places[:, 1] > 0.3031]
+    assert len(back) > 20 and back[:, 0] == pytest.approx(0.303 - (back[:, 1] - 0.303) / math.tan(math.radians(5.0)))
 
 
 def test_no_step_takes_another_branch_on_which_something_touches():
