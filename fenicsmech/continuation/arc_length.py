@@ -301,10 +301,10 @@ class ArcLengthStepper(Stepper):
                 reason = str(failure)
             self.length *= 0.5
             if self.length < steps.smallest * min(longest / steps.largest, 1.0):
-                if (found := self._back_from_corner(steps.tolerance * longest)) is not None:
-                    self._accept(found, self.metric.norm(self.chord(point, found)))
+                if (beyond := self._back_from_corner(steps.tolerance * longest)) is not None:
+                    self._accept(beyond, self.metric.norm(self.chord(point, beyond)))
                     self.length = steps.first
-                    return found
+                    return beyond
                 if not self._turn_links():
                     raise NotConverged(reason)
                 self.length = longest

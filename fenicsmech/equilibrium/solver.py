@@ -25,6 +25,8 @@ from fenicsmech.errors import counted, expect, set_options
 
 _STRETCHED = 5e-3  # motion over the mechanism's length, about an element's size, that rounds u as F = I + ∇u is
 _NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
+_STILL = 1e-12  # likewise, that is the rounding of displacements
+_FAR = 100.0  # residual over rounding beyond which no step is as small as that
 _ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
 _TURNED = 1e-6  # likewise along the next step, where stiff links turn
 STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
@@ -207,18 +209,21 @@ class EquilibriumSolver(ABC):
 
             r · x ≤ 1e-4 forces |x|,     K x = r.
 
-        Where stiff links turn, their rounding may be more of the forces, but along x only 1e-6 of them. Where that of K
-        drowns what resists, x tells nothing.
+        Where stiff links turn, their rounding may be more of the forces, but along x only 1e-6 of them. That of many
+        nodes may exceed its bound: an x as small as the rounding of displacements shows it. Where that of K drowns what
+        resists, x tells nothing.
         """
-        near_singular = residual.norm <= self.roundoff(residual)
-        if not (near_singular or residual.norm <= self.rounding(residual)) or not math.isfinite(residual.norm):
+        near_singular, rounding = residual.norm <= self.roundoff(residual), self.rounding(residual)
+        if not (near_singular or residual.norm <= _FAR * rounding) or not math.isfinite(residual.norm):
             raise failure
         at = self.linearise(best, control, iterations=failure.iterations)
         x = at.solve(at.residual.vector)
         motion = self.system.size(self.system.unknowns.step(x))
         work = abs(x.dot(at.residual.vector)) / self.system.unknowns.unit
         share = _ROUNDING if near_singular else _TURNED
-        if not (motion <= _NO_MOTION or work <= share * at.residual.forces * motion) or at.drowns_modes:
+        within = near_singular or residual.norm <= rounding
+        balanced = within and (motion <= _NO_MOTION or work <= share * at.residual.forces * motion)
+        if not (balanced or motion <= _STILL) or at.drowns_modes:
             raise failure
         residuals = [*residuals[: failure.iterations], self.relative(at.residual)]
         return at.point(residuals, failure.iterations, tolerance=STEP)

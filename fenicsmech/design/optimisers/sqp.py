@@ -97,6 +97,10 @@ class SQP(Optimiser):
     Attributes:
         iterations: largest number.
         tolerance: least reduction worth a step, over the merit.
+        flat: change of the residuals by the lengths of all parameters, over the residuals, below which a stationary
+            point may be a saddle, as a straight link's that may bend to either side.
+        aside: largest change of a parameter, over its length, to a point beside such a saddle.
+        tries: descents from points beside it, at most.
         violation: largest value of an inequality that counts as satisfied.
         damping: μ at the start, over the change of O when parameters change by their lengths.
         least_damping: least μ, which keeps parameters without influence in place.
@@ -110,6 +114,9 @@ class SQP(Optimiser):
 
     iterations: int = 60
     tolerance: float = 5e-3
+    flat: float = 0.1
+    aside: float = 0.5
+    tries: int = 2
     violation: float = 1e-3
     damping: float = 1e-2
     least_damping: float = 1e-9
@@ -120,7 +127,7 @@ class SQP(Optimiser):
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        set_options(self, name, free=("poor",), iterations=1, refusals=1, stalls=1)
+        set_options(self, name, free=("poor",), iterations=1, refusals=1, stalls=1, tries=0)
         if not self.poor < self.good:
             raise DescriptionError(
                 f"reductions of {name}",
@@ -137,6 +144,32 @@ class SQP(Optimiser):
         return np.concatenate([[min(memory[0], self.damping), 0.0], memory[2:]])
 
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
+        last = self._descent(problem, start, watch)
+        if self._may_be_saddle(last, problem.lengths):
+            last = self._from_beside(problem, last, watch)
+        watch(last)
+        return last
+
+    def _from_beside(self, problem: Problem, saddle: Iterate, watch: Callable[[Iterate], None]) -> Iterate:
+        """The first lower end of descents from points beside a ``saddle``; that itself if there is none."""
+        # the same directions every time
+        ways = np.random.default_rng(0).uniform(-self.aside, self.aside, (self.tries, len(problem.lengths)))
+        number, evaluations = saddle.number, saddle.evaluations
+        for way in ways:
+            beside = saddle.evaluation.parameters + way * problem.lengths
+            try:
+                end = self._descent(problem, Start(beside, number, evaluations), watch)
+            except Infeasible:
+                evaluations += 1
+                continue
+            if end.evaluation.value < saddle.evaluation.value:
+                return end
+            number, evaluations = end.number, end.evaluations
+        problem.evaluate(saddle.evaluation.parameters)
+        return replace(saddle, number=number, evaluations=evaluations + 1)
+
+    def _descent(self, problem: Problem, start: Start, watch: Callable[[Iterate], None]) -> Iterate:
+        """The end of a descent; ``watch`` is called with all iterates before."""
         here, lengths = problem.evaluate(start.parameters), problem.lengths
         memory = self._begin(here, lengths) if start.memory is None else Memory.unpacked(start.memory, here)
         last, ahead = self._iterate(start.number, start.evaluations + 1, here, memory, lengths)
@@ -148,8 +181,15 @@ class SQP(Optimiser):
                 last = replace(last, reason=Reason.RESOLVED)
             else:
                 last, ahead = self._advance(problem, last, ahead, lengths)
-            watch(last)
+            if last.reason is None:
+                watch(last)
         return last
+
+    def _may_be_saddle(self, last: Iterate, lengths: np.ndarray) -> bool:
+        """Whether an end is one at which residuals hardly depend on the parameters, to first order."""
+        here = last.evaluation
+        r, most = float(np.linalg.norm(here.residuals)), float(np.linalg.norm(here.jacobian * lengths))
+        return last.reason is Reason.CONVERGED and r**2 > here.value and most < self.flat * r
 
     def _begin(self, here: Evaluation, lengths: np.ndarray) -> Memory:
         """Memory at the start: O changes by the scale, and f's gradient by itself, when p changes by its lengths."""

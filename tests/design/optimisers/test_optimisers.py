@@ -83,6 +83,23 @@ class Rosenbrock(Problem):
         )
 
 
+class Ridge(Problem):
+    """r = 0.1 + sign x², whose derivative vanishes at the start, x = y = 0, a saddle of |r|² or its minimum; infeasible
+    at negative x where ``one_sided``."""
+
+    def __init__(self, sign: float, *, one_sided: bool = False) -> None:
+        self.sign, self.one_sided = sign, one_sided
+        super().__init__(np.zeros(2), np.ones(2))
+
+    def check(self, parameters):
+        if self.one_sided and parameters[0] < 0.0:
+            raise Infeasible("x is negative")
+
+    def residuals(self, parameters):
+        x, _ = parameters
+        return np.array([0.1 + self.sign * x * x]), np.array([[2.0 * self.sign * x, 0.0]])
+
+
 class Wall(Problem):
     """r = x − 10, and a steep barrier from x = 1 on, which costs 1e5 times the residual where the residual vanishes.
 
@@ -223,6 +240,24 @@ def test_a_minimum_is_recognised_at_once(optimiser):
     assert last.reason is Reason.CONVERGED
     assert (last.number, last.evaluations) == (0, 1)
     assert len(history) == 2
+
+
+@pytest.mark.parametrize("one_sided", [False, True])
+def test_a_saddle_from_which_no_first_order_step_leads_is_left(one_sided):
+    problem = Ridge(-1.0, one_sided=one_sided)
+    last, history = watched(LevenbergMarquardt(), problem)
+    assert last.reason is Reason.CONVERGED
+    assert abs(last.evaluation.parameters[0]) == pytest.approx(np.sqrt(0.1), rel=0.05)
+    numbers = [iterate.number for iterate in history]
+    assert numbers == sorted(numbers) and [own.reason for own in history[:-1]] == [None] * (len(history) - 1)
+    assert last.evaluations == len(problem.asked)
+
+
+def test_a_minimum_where_residuals_depend_on_nothing_is_returned_to():
+    problem = Ridge(1.0)
+    last, _ = watched(LevenbergMarquardt(), problem)
+    assert last.reason is Reason.CONVERGED and np.array_equal(last.evaluation.parameters, problem.start)
+    assert np.array_equal(problem.asked[-1], problem.start) and last.evaluations == len(problem.asked)
 
 
 def test_least_squares_structure_pays():

@@ -116,10 +116,25 @@ def unstrained_work(
             part = float(np.imag(potential.alone(plan).effect_energy(at, there))) / STEP
             work += part
             if not pressure:
-                size += potential.weight * fastest if isinstance(plan, GravityPlan) else abs(part)
+                size += _held(potential, plan, places) * fastest
             grain += _grain(potential, plan, places, there, fastest)
         shares.append(max(0.0, abs(work) - grain) / max(size, 1e-300))
     return max(shares, default=0.0)
+
+
+def _held(potential: Potential, plan: EffectPlan, places: list[Place]) -> float:
+    """The force of a spring, turned by the mechanism's length, of a joint that gives way, or the weight."""
+    match plan:
+        case SpringPlan(joint=name, stiffness=stiffness, rest=rest):
+            joint = potential.blueprint.joint(name)
+            turn = potential.closure.coordinate(joint, places).real - potential.load_factor * rest
+            return float(abs(stiffness * turn)) / (1.0 if joint.kind == "prismatic" else potential.blueprint.length)
+        case CompliancePlan(joint=name, compliance=compliance):
+            gap = potential.closure.gap(potential.blueprint.joint(name), places).real
+            return float(np.sqrt(np.sum(gap**2))) / compliance
+        case GravityPlan():
+            return potential.weight
+    return 0.0
 
 
 def _grain(potential: Potential, plan: EffectPlan, places: list[Place], there: list[Place], fastest: float) -> float:
