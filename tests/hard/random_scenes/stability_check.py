@@ -23,6 +23,7 @@ from .potential import Potential
 from .thresholds import THRESHOLDS
 
 _IMAGINARY, _REAL = 1e-30, 1e-5
+_NEAR = 1e-10  # over the mechanism's length: less than penetrations, at the end of which contact has kinks
 # unknowns up to which all eigenvalues are found; beyond, the four nearest to zero, unless some are negative
 _DENSE = 500
 
@@ -219,7 +220,7 @@ def _stiffness(potential: Potential, u: np.ndarray) -> sparse.csr_matrix:
         for cells, slopes, tangent in potential.tangents(u, imaginary=_IMAGINARY, real=_REAL)
     ]
     for touch in potential.touches:
-        found = touch.tangents(mesh, u, imaginary=_IMAGINARY, real=_REAL)
+        found = touch.tangents(mesh, u, imaginary=_IMAGINARY, real=_NEAR * potential.blueprint.length)
         blocks += [(cells, potential.load_factor * block) for cells, block in found]
     for cells, block in blocks:
         dofs = (mesh.cells[cells][..., None] * mesh.dim + np.arange(mesh.dim)).reshape(len(cells), -1)

@@ -118,7 +118,8 @@ def unstrained_work(
             if not pressure:
                 size += _held(potential, plan, places) * fastest
             grain += _grain(potential, plan, places, there, fastest)
-        shares.append(max(0.0, abs(work) - grain) / max(size, 1e-300))
+        if size > 0.0:  # nothing balances where nothing acts
+            shares.append(max(0.0, abs(work) - grain) / size)
     return max(shares, default=0.0)
 
 
