@@ -495,8 +495,9 @@ class CurveStepper:
 
     def _links_below_rounding(self, state: State) -> bool:
         """Whether soft links resist less than the rounding of stiff ones."""
+        control = self.followed.at(self.followed.value(self._system, state))
         try:
-            return self.solver.linearise(state, LoadControl(state.force)).drowns_modes
+            return self.solver.linearise(state, control).drowns_modes
         except NotConverged:
             return False
 
