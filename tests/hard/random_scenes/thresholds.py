@@ -69,7 +69,7 @@ class Thresholds:
     digits: float = 1e6
     signless: float = 1e-10
     scaled: float = 1e-14
-    unknowns: int = 2500
+    unknowns: int = 4000
     rank: float = 1e-9
     frames: int = 6
     directions: int = 8
