@@ -381,11 +381,14 @@ class CurveStepper:
     def _beyond_steps(self, failure: LoadStepsFailed, start: State, control: LoadFactorControl) -> State | None:
         """The equilibrium under all constant loads where load steps from ``start`` ended; None if none is found."""
         halfway, where = control.at(0.5 * failure.reached), self.request.where
-        found = self._followed(start, halfway) or self._snapped(failure, control, "constant loads")
-        if found is None and (found := self._settled(control)) is not None:
+        if (found := self._followed(start, halfway)) is not None:
+            return found
+        if (found := self._settled(control)) is not None:
             _log.warning("%s: steps of constant loads end early; curves start where these and springs balance", where)
             self._effort += Effort(snaps=1)
-        return found or self._followed(start, halfway, past_turns=True)
+            return found
+        snapped = self._snapped(failure, control, "constant loads")
+        return snapped or self._followed(start, halfway, past_turns=True)
 
     def _followed(self, start: State, control: LoadFactorControl, *, past_turns: bool = False) -> State | None:
         """The equilibrium under all constant loads on the path from ``start`` through that at ``control``, or the first
