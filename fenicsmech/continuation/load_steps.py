@@ -27,15 +27,14 @@ the same on all processes and machines, and not by time:
        beyond a dead centre
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
        may have left at a corner
-    11. of constant loads: the path by arc length from half    ``LoadSteps.arc_steps``, or where it turns back
-       of those reached
+    11. of constant loads: the path by arc length from half    ``LoadSteps.arc_steps``
+       of those reached, past its turns, to the first
+       stable equilibrium under all
     12. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
        which they balance with springs; first of all where
        these are softer than the rounding of stiff links
     13. of motors and constant loads: descent to an            seven solves, ``LoadSteps.snap_iterations`` times as
-       equilibrium after a snap, and load steps from there;   long, and as these
-       of constant loads then the path of 11, past its
-       turns, to the first stable equilibrium under all       ``LoadSteps.arc_steps``
+       equilibrium after a snap, and load steps from there    long, and as these
     14. of curves that have snapped: load steps from rest to    as these
        the value, whose path may go on where that snapped
        to ends

@@ -341,7 +341,16 @@ class CurveStepper:
             with self.keeping_frames():
                 state = stepper.advance(control.at(1.0)).state
         except LoadStepsFailed as failure:
-            if (found := self._beyond_steps(failure, start, control)) is not None:
+            if (found := self._followed(start, control.at(0.5 * failure.reached))) is not None:
+                return found
+            if (found := self._settled(control)) is not None:
+                _log.warning(
+                    "%s: steps of constant loads end early; curves start where these and springs balance",
+                    self.request.where,
+                )
+                self._effort += Effort(snaps=1)
+                return found
+            if (found := self._snapped(failure, control, "constant loads")) is not None:
                 return found
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
@@ -378,21 +387,9 @@ class CurveStepper:
         moved = self._system.size(self._system.difference(point.state, state))
         return point.state if moved <= LoadSteps().motion and not point.state.unstable else None
 
-    def _beyond_steps(self, failure: LoadStepsFailed, start: State, control: LoadFactorControl) -> State | None:
-        """The equilibrium under all constant loads where load steps from ``start`` ended; None if none is found."""
-        halfway, where = control.at(0.5 * failure.reached), self.request.where
-        if (found := self._followed(start, halfway)) is not None:
-            return found
-        if (found := self._settled(control)) is not None:
-            _log.warning("%s: steps of constant loads end early; curves start where these and springs balance", where)
-            self._effort += Effort(snaps=1)
-            return found
-        snapped = self._snapped(failure, control, "constant loads")
-        return snapped or self._followed(start, halfway, past_turns=True)
-
-    def _followed(self, start: State, control: LoadFactorControl, *, past_turns: bool = False) -> State | None:
-        """The equilibrium under all constant loads on the path from ``start`` through that at ``control``, or the first
-        stable one ``past_turns`` of it; None if none is found."""
+    def _followed(self, start: State, control: LoadFactorControl) -> State | None:
+        """The first stable equilibrium under all constant loads on the path from ``start`` through that at ``control``,
+        past its turns; None if none is found."""
         if not control.prescribed:
             return None
         stepper = LoadStepper(self.solver, start, control, predictor=self.discretisation.predictor)
@@ -400,11 +397,9 @@ class CurveStepper:
         try:
             first = stepper.advance(control)
             found, iterations, turned = follow_to(
-                self.solver, first.state, control.at(1.0), steps, most=most, past_turns=past_turns
+                self.solver, first.state, control.at(1.0), steps, most=most, past_turns=True
             )
         except (LoadStepsFailed, NotConverged, EquilibriumError):  # the last one of a potential, on the way
-            return None
-        if found.unstable_modes:
             return None
         if turned:
             _log.warning("%s: the path of constant loads turns back; curves start where it ends", self.request.where)
