@@ -228,8 +228,6 @@ class LoadStepper(Stepper):
             try:
                 point = aside.pop(value, None) or self._correct(self._guess(control.at(value)), control.at(value))
                 snapped = self._snapped(point)
-                if snapped and point.state.unstable and not self._points[-1].state.unstable:
-                    raise NotConverged("what was found past a turn of the path is unstable", point.iterations)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
                     step, beyond, halved = 0.5 * (value - self._value), point, True
                     if self.system.contact is not None:

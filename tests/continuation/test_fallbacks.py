@@ -98,25 +98,6 @@ def test_steps_turn_links_once_the_smallest_have_failed_and_begin_with_the_whole
     assert len(path.tried) == 1 + path.failed > 8 and turning.tried == [(0.1, 0.0)]
 
 
-@pytest.mark.parametrize("unstable", [False, True])
-def test_a_snap_ends_in_an_equilibrium_only_if_that_is_stable(unstable):
-    class Folded(Stubborn):
-        """Beyond 0.05 the next equilibrium is 5 away."""
-
-        def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
-            point = super().solve(start, control)
-            away = 5.0 if control.prescribed > 0.05 else 0.0
-            return replace(point, state=replace(point.state, u=point.state.u + away, unstable=unstable and away > 0.0))
-
-    walk = stepper(Folded(math.inf))
-    if not unstable:
-        assert walk.advance(LoadControl(0.1)).state.u[0] == pytest.approx(5.1) and walk.snaps == 1
-        return
-    with pytest.raises(LoadStepsFailed, match="unstable") as failure:
-        walk.advance(LoadControl(0.1))
-    assert failure.value.reached == pytest.approx(0.05, rel=2e-3) and walk.snaps == 0
-
-
 @pytest.mark.parametrize("part", [2.0 * LoadSteps().smallest, 1.1 / 64.0, 0.1])  # halves of these are not too small
 def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(part):
     path = Stubborn(0.1 * part)
