@@ -309,6 +309,14 @@ class ArcLengthStepper(Stepper):
                     raise NotConverged(reason)
                 self.length = longest
 
+    def _turn_links(self) -> bool:
+        """Lets steps turn links from now on instead of straining them; whether they did not before."""
+        turning = self.solver.turning
+        if turning is None:
+            return False
+        self.solver = turning
+        return True
+
     def _stays_on_path(self, start: EquilibriumPoint, end: EquilibriumPoint, turn: float, touched: bool) -> bool:
         """Whether the path through ``start`` leads to ``end``, with a ``turn`` that steps may have; ``touched`` is
         whether other points touch there."""

@@ -19,22 +19,23 @@ the same on all processes and machines, and not by time:
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
     5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
-    6. half the step                                           ``LoadSteps.smallest``, or ``failures`` in a row
-    7. steps that turn links (``equilibrium.turning``), 1 to   as these; from then on, all steps are such
-       6 from the whole way on
+    6. steps that turn links (``equilibrium.turning``), 1 to   as these; the kind that led to the last equilibrium
+       5, or those that do not                                 comes first
+    7. half the step, or 3/4 of the way to the fold that       ``LoadSteps.smallest``, or ``failures`` in a row
+       the tangents predict before the value that failed
     8. the nearest equilibrium found past a fold, a snap       one
-    9. of motors and constant loads: links that strain         ten halvings; then load steps once more
-       beyond a dead centre
+    9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
+       beyond a dead centre                                    not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
        may have left at a corner
-    11. of constant loads: the path by arc length from half    ``LoadSteps.arc_steps``
-       of those reached, past its turns, to the first
-       stable equilibrium under all
-    12. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
+    11. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
        which they balance with springs; first of all where
        these are softer than the rounding of stiff links
-    13. of motors and constant loads: descent to an            seven solves, ``LoadSteps.snap_iterations`` times as
+    12. of motors and constant loads: descent to an            seven solves, ``LoadSteps.snap_iterations`` times as
        equilibrium after a snap, and load steps from there    long, and as these
+    13. of constant loads: the path by arc length from half    ``LoadSteps.arc_steps``
+       of those reached, past its turns, to the first
+       stable equilibrium under all
     14. of curves that have snapped: load steps from rest to    as these
        the value, whose path may go on where that snapped
        to ends
@@ -62,6 +63,7 @@ with x held:
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from fenicsmech.collective import agreed
@@ -95,6 +97,7 @@ class LoadSteps:
         smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap.
         fold_growth: growth of the tangent over the last step from which the path counts as turning back.
         fold_ahead: largest distance ahead at which it does, over the last step that failed.
+        fold_part: of the way to the fold that a step takes once one beyond it has failed.
         minimum_shift: least shift of the KKT matrix, in units of links' stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
@@ -119,6 +122,7 @@ class LoadSteps:
     smallest_snap_step: float = 1.0 / 64.0
     fold_growth: float = 1.1
     fold_ahead: float = 4.0
+    fold_part: float = 0.75
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
     arc_steps: int = 300
@@ -199,7 +203,7 @@ class LoadStepper(Stepper):
         shifts: LeastShifts | None = None,
     ) -> None:
         super().__init__(solver, predictor, start)
-        self._steps = LoadSteps()
+        self._steps, self._plain = LoadSteps(), solver
         self._shifts = shifts or self._steps.least_shifts(start.minimum_shift)
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin, self._covered = self._value, 0.0  # farthest from there so far
@@ -217,30 +221,28 @@ class LoadStepper(Stepper):
             self._settle(control.at(self._value))
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
+        failing: float | None = None  # the last value without equilibrium, or beyond a fold
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
         # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
         aside, halved = dict[float, EquilibriumPoint](), False
         while True:
             remaining = control.prescribed - self._value
-            step = self._limited(step, distance)
+            step = self._before_fold(self._limited(step, distance), failing, distance)
             arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.prescribed if arrives else self._value + step
             try:
                 point = aside.pop(value, None) or self._correct(self._guess(control.at(value)), control.at(value))
                 snapped = self._snapped(point)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
-                    step, beyond, halved = 0.5 * (value - self._value), point, True
+                    step, beyond, halved, failing = 0.5 * (value - self._value), point, True, value
                     if self.system.contact is not None:
                         aside[value] = point
                     continue
             except NotConverged as failure:
                 tried.append(value)
-                failed, halved = failed + 1, True
+                failed, halved, failing = failed + 1, True, value
                 step = 0.5 * (value - self._value)
                 if abs(step) > steps.smallest * self._scale(distance) and failed < steps.failures:
-                    continue
-                if self._turn_links():
-                    step, failed = remaining, 0
                     continue
                 if beyond is None:
                     fold = self._fold(tried[-1])
@@ -295,6 +297,21 @@ class LoadStepper(Stepper):
             pass
 
     def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
+        """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind."""
+        try:
+            return self._shifted(guess, control)
+        except NotConverged:
+            other = self.solver.turning or self._plain
+            if other is self.solver:
+                raise
+        last, self.solver = self.solver, other
+        try:
+            return self._shifted(guess, control)
+        except NotConverged:
+            self.solver = last
+            raise
+
+    def _shifted(self, guess: State, control: Control) -> EquilibriumPoint:
         """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there."""
         at_start = control.prescribed == self._origin
         shifts = self._shifts.at_start if at_start else self._shifts.elsewhere
@@ -352,6 +369,13 @@ class LoadStepper(Stepper):
         limited = step * min(1.0, self._steps.motion / max(motion, self._steps.motion))
         return limited if abs(limited) > self._steps.smallest_limited * abs(distance) else step
 
+    def _before_fold(self, step: float, failing: float | None, distance: float) -> float:
+        """``step``, shortened to a part of the way to the fold if the path turns back before the ``failing`` value."""
+        if failing is None or (fold := self._fold(failing)) is None:
+            return step
+        least = 2.0 * self._steps.smallest * self._scale(distance)  # which ends the steps if it fails
+        return math.copysign(min(abs(step), max(self._steps.fold_part * abs(fold - self._value), least)), step)
+
     def _scale(self, distance: float) -> float:
         """Reference length of steps: the distance covered so far, at first the first step, whatever the end.
 
@@ -405,25 +429,32 @@ class DeadCentreStepper(LoadStepper):
         try:
             return super().advance(control)
         except LoadStepsFailed as failure:
-            if failure.last is None or not self._pass_dead_centre(failure.last, control):
+            if failure.last is None or not self._pass_dead_centre(failure.last, failure.tried[-1], control):
                 raise
         return super().advance(control)
 
-    def _pass_dead_centre(self, last: EquilibriumPoint, control: Control) -> bool:
-        """Continues from the ``last`` equilibrium by straining links; whether this succeeded."""
+    def _pass_dead_centre(self, last: EquilibriumPoint, tried: float, control: Control) -> bool:
+        """Continues from the ``last`` equilibrium by straining links, past a dead centre before the value that was
+        ``tried``; whether this succeeded."""
         system, steps, distance = self.system, self._steps, control.prescribed - self._value
+        closing = 2.0 * system.size(last.tangent) * abs(tried - self._value)
         try:
             rate = self._straining_rate(last, control.at(self._value))
         except NotConverged:
             return False
         step = distance * min(1.0, steps.motion / max(system.size(rate) * abs(distance), steps.motion))
+        found = False  # an equilibrium, farther off
         while abs(step) > steps.smallest * self._scale(distance):
             guess = system.moved(last.state, rate.scaled(step))
             try:
-                point = self._correct(guess, control.at(self._value + step))
+                point = self._shifted(guess, control.at(self._value + step))
             except NotConverged:
-                point = None
-            if point is None or self._left_path(last, rate, step, point):
+                if found:  # nearer by it would be too
+                    return False
+                step *= 0.5
+                continue
+            found = True
+            if self._left_path(last, rate, step, point, closing):
                 step *= 0.5
                 continue
             _log.info("links strain beyond a dead centre near %g", self._value)
@@ -432,12 +463,18 @@ class DeadCentreStepper(LoadStepper):
             return True
         return False
 
-    def _left_path(self, last: EquilibriumPoint, straining: Step, step: float, point: EquilibriumPoint) -> bool:
-        """Whether a coordinate's rate over ``step`` lies outside the range of the ``straining`` one and the tangents at
-        its ends."""
+    def _left_path(
+        self, last: EquilibriumPoint, straining: Step, step: float, point: EquilibriumPoint, closing: float
+    ) -> bool:
+        """Whether a coordinate's rate over ``step`` lies outside the range of the ``straining`` one and the tangent at
+        its end by more than joints move while they are ``closing``.
+
+        x = √(2 (p − v)) before a dead centre at p has the rate x′ = −1 / x and closes by x = 2 |x′| (p − v).
+        """
         rate = self.system.difference(point.state, last.state).scaled(1.0 / step)
         largest = max(self.system.size(straining), self.system.size(point.tangent))
-        return self._beyond(rate, (straining, last.tangent, point.tangent), point) > self._steps.deviation * largest
+        beyond = self._beyond(rate, (straining, point.tangent), point)
+        return beyond > self._steps.deviation * largest + closing / abs(step)
 
     def _straining_rate(self, last: EquilibriumPoint, control: Control) -> Step:
         """Rate of the state with the value of ``control`` that strains links instead of the dominant motion x.

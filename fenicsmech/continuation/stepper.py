@@ -117,14 +117,6 @@ class Stepper:
         """The guess ``ahead`` of the last point."""
         return self.predictor.predict(self.system, self._points, self._width, ahead)
 
-    def _turn_links(self) -> bool:
-        """Lets steps turn links from now on instead of straining them; whether they did not before."""
-        turning = self.solver.turning
-        if turning is None:
-            return False
-        self.solver = turning
-        return True
-
     def _others_touch(self, a: np.ndarray, b: np.ndarray) -> bool:
         """Whether other points touch obstacles in ``b`` than in ``a``, as in ``EquilibriumPoint.touching``."""
         system = self.system

@@ -378,21 +378,34 @@ class PredictedStress:
 
     def __init__(self, body: ElasticBody) -> None:
         self._body, space = body, body.u.function_space
-        self._before, self._motion = (fem.Function(space, name=name) for name in ("before", "motion"))
+        self._before, self._motion = (
+            [fem.Function(field.function_space, name=name) for field in body.fields] for name in ("before", "motion")
+        )
         v, w = (body.gradient(argument) for argument in (ufl.TestFunction(space), ufl.TrialFunction(space)))
         F = ufl.Identity(body.model.dim) + body.gradient(body.u)
+        earlier = dict(zip(body.fields, self._before, strict=True))
         forces, stiffness = [], []
-        for (before, measure), (present, _) in zip(self._stresses(self._before), self._stresses(body.u), strict=True):
-            change = before + ufl.derivative(before, self._before, self._motion) - present
+        for present, measure in self._stresses():
+            before = ufl.replace(present, earlier)
+            rates = [ufl.derivative(before, *pair) for pair in zip(self._before, self._motion, strict=True)]
+            change = sum(rates, start=before) - present
             forces.append(ufl.inner(ufl.dot(F, change), v) * measure)
             stiffness.append(ufl.inner(ufl.dot(w, change), v) * measure)
         self._forces, self._stiffness = compile_form(_sum(forces)), compile_form(_sum(stiffness))
 
+    @cached_property
+    def _no_compliance(self):
+        """The zero block of p, which dolfinx needs to know its space."""
+        space = self._body.pressure.p.function_space
+        p, q = ufl.TrialFunction(space), ufl.TestFunction(space)
+        return compile_form(fem.Constant(self._body.mesh, 0.0) * p * q * self._body.dx)
+
     def take(self, before: np.ndarray, motion: np.ndarray) -> None:
-        """Takes the displacements u before the step, and the step δu, of this rank's owned nodes, flat."""
-        for field, values in ((self._before, before), (self._motion, motion)):
-            owned_values(field)[:] = values
-            field.x.scatter_forward()
+        """Takes (u, p) before the step, and the step of both, of this rank's owned values, flat."""
+        for fields, values in ((self._before, before), (self._motion, motion)):
+            for field, own in zip(fields, self._body.split(values), strict=True):
+                owned_values(field)[:] = own
+                field.x.scatter_forward()
 
     def forces(self) -> np.ndarray:
         """∫ F ΔS : ∇v dV, this rank's owned values, flat."""
@@ -400,11 +413,14 @@ class PredictedStress:
 
     def add_stiffness(self, matrix: PETSc.Mat) -> None:
         """Adds ∫ ∇v ΔS : ∇w dV into ``matrix`` and leaves it unassembled."""
-        petsc.assemble_matrix(matrix, self._stiffness)
+        if self._body.pressure is None:
+            petsc.assemble_matrix(matrix, self._stiffness)
+        else:
+            add_blocks(matrix, [[self._stiffness, None], [None, self._no_compliance]])
 
-    def _stresses(self, u: fem.Function):
+    def _stresses(self):
         """Second Piola–Kirchhoff stress S = F⁻¹ ∂W/∂F per volume of the mesh, and where it holds, per law."""
-        H = ufl.variable(self._body.gradient(u))
+        H = ufl.variable(self._body.gradient(self._body.u))
         F = ufl.Identity(self._body.model.dim) + H
         for work, measure in self._body.densities(H):
             stress = ufl.dot(ufl.inv(F), ufl.diff(work, H))

@@ -207,7 +207,7 @@ class NewtonSolver(EquilibriumSolver):
                 state, residual, length = advance(state, control, step, residual, iteration)
             except NotConverged as failure:
                 return self.accept_best(*best, control, residuals, failure)
-            last = (before, -length * motion) if self._predicts_stress else None
+            last = (before, -length * motion) if self.options.predicted_stress else None
             close = self.relative(residual) < options.near
             if near and not (close and residual.norm <= norm) and not self.converged(residual, norm):
                 # once from a stable equilibrium too: just beyond a bifurcation small residuals hide large motions
@@ -258,14 +258,9 @@ class NewtonSolver(EquilibriumSolver):
                 except NotConverged:
                     pass
                 else:
-                    return state, after, (start, -length * motion) if self._predicts_stress else None
+                    return state, after, (start, -length * motion) if self.options.predicted_stress else None
         self._again(start, control)
         return None
-
-    @property
-    def _predicts_stress(self) -> bool:
-        """Pressures of mixed elements are stresses that the step solves for already."""
-        return self.options.predicted_stress and not self.system.blocks.pressures.size
 
     def residual(self, state: State, control: Control) -> Residual:
         """The residual that steps bring to zero."""

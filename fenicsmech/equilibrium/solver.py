@@ -82,7 +82,7 @@ class EquilibriumSolver(ABC):
 
     @property
     def turning(self) -> EquilibriumSolver | None:
-        """A solver whose steps turn links instead of straining them, which takes longer; None if there is none."""
+        """A solver whose steps turn links instead of straining them; None if there is none."""
         return None
 
     def solve(self, start: State, control: Control) -> EquilibriumPoint:

@@ -341,8 +341,6 @@ class CurveStepper:
             with self.keeping_frames():
                 state = stepper.advance(control.at(1.0)).state
         except LoadStepsFailed as failure:
-            if (found := self._followed(start, control.at(0.5 * failure.reached))) is not None:
-                return found
             if (found := self._settled(control)) is not None:
                 _log.warning(
                     "%s: steps of constant loads end early; curves start where these and springs balance",
@@ -351,6 +349,8 @@ class CurveStepper:
                 self._effort += Effort(snaps=1)
                 return found
             if (found := self._snapped(failure, control, "constant loads")) is not None:
+                return found
+            if (found := self._followed(start, control.at(0.5 * failure.reached))) is not None:
                 return found
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])

@@ -91,11 +91,17 @@ def test_shifts_where_loads_resist_are_the_smallest_first_away_from_the_start_an
     assert path.tried[-1] == (0.0, largest)
 
 
-def test_steps_turn_links_once_the_smallest_have_failed_and_begin_with_the_whole_way():
+def test_steps_that_turn_links_come_before_half_the_step_and_the_kind_that_succeeded_comes_first():
     path, turning = Stubborn(0.0), Stubborn(math.inf)
-    path.turning = turning
-    assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
-    assert len(path.tried) == 1 + path.failed > 8 and turning.tried == [(0.1, 0.0)]
+    path.turning, turning.turning = turning, None
+    walk = stepper(path)
+    for wanted in (0.1, 0.2):
+        assert walk.advance(LoadControl(wanted)).state.force == wanted
+    assert [value for value, _ in path.tried] == [0.0, 0.1] and path.failed == 1
+    assert [value for value, _ in turning.tried] == [0.1, 0.2]
+    path.longest, turning.longest = math.inf, 0.0
+    assert walk.advance(LoadControl(0.3)).state.force == 0.3
+    assert path.tried[-1] == turning.tried[-1] == (0.3, 0.0)
 
 
 @pytest.mark.parametrize("part", [2.0 * LoadSteps().smallest, 1.1 / 64.0, 0.1])  # halves of these are not too small
