@@ -72,7 +72,7 @@ class Thresholds:
     unknowns: int = 4000
     rank: float = 1e-9
     frames: int = 6
-    directions: int = 8
+    directions: int = 64
     joined: float = 1e-6
     immobile: float = 1e-9
     adrift: float = 1e-6
