@@ -84,6 +84,7 @@ class LoadSteps:
         motion: largest motion of a step along the tangent (measured).
         failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
             itself. Those before an equilibrium that was reached do not count.
+        failures_held: likewise where joints and motors hold the point that is to move.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -112,6 +113,7 @@ class LoadSteps:
     smallest: float = 1.0 / 1024.0
     motion: float = 0.2
     failures: int = 40
+    failures_held: int = 8
     smallest_limited: float = 1e-6
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
@@ -129,7 +131,7 @@ class LoadSteps:
     snap_iterations: int = 4
 
     def __post_init__(self) -> None:
-        set_options(self, "load steps", failures=1, iterations=1, arc_steps=1, snap_iterations=1)
+        set_options(self, "load steps", failures=1, failures_held=1, iterations=1, arc_steps=1, snap_iterations=1)
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 
@@ -187,6 +189,7 @@ class LoadStepper(Stepper):
         control: whose prescribed value changes.
         predictor: of the next equilibrium.
         shifts: for zero-energy modes; by default those of the start's least shift, the largest first.
+        steps: options; the default ones if left out.
 
     Attributes:
         iterations: KKT systems factored and solved so far.
@@ -201,9 +204,10 @@ class LoadStepper(Stepper):
         *,
         predictor: Predictor,
         shifts: LeastShifts | None = None,
+        steps: LoadSteps | None = None,
     ) -> None:
         super().__init__(solver, predictor, start)
-        self._steps, self._plain = LoadSteps(), solver
+        self._steps, self._plain = steps or LoadSteps(), solver
         self._shifts = shifts or self._steps.least_shifts(start.minimum_shift)
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin, self._covered = self._value, 0.0  # farthest from there so far

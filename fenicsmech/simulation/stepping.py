@@ -106,10 +106,13 @@ class CurveStepper:
         """Load steps from the equilibrium under constant loads to which ``rest`` led."""
         self._system.load(state)
         resist = (rest.loads_resist and not rest.reached) or self._springs_below_rounding
-        shifts = LoadSteps().least_shifts(state.minimum_shift, loads_resist=resist)
+        steps = LoadSteps()
+        shifts = steps.least_shifts(state.minimum_shift, loads_resist=resist)
         kind = DisplacementControl() if control.constrained else LoadControl()
+        if control.constrained and from_one(self.discretisation.comm, lambda: self._is_held(state)):
+            steps = replace(steps, failures=steps.failures_held)
         predictor = self.discretisation.predictor
-        return LoadStepper(self.solver, state, kind, predictor=predictor, shifts=shifts)
+        return LoadStepper(self.solver, state, kind, predictor=predictor, shifts=shifts, steps=steps)
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
@@ -430,7 +433,9 @@ class CurveStepper:
 
     def _unreached(self, control: Control, failure: LoadStepsFailed) -> EquilibriumError:
         last, where = self._last(failure), self.request.where
-        if control.constrained and from_one(self.discretisation.comm, self._is_held):
+        start = self._start
+        assert start is not None, "steps that fail have started"
+        if control.constrained and from_one(self.discretisation.comm, lambda: self._is_held(start.state)):
             return EquilibriumError(
                 where,
                 f"no equilibrium at displacement {control.prescribed - self.origin:g}: joints and motors hold its "
@@ -480,10 +485,9 @@ class CurveStepper:
         """The last equilibrium reached, on the way to a prescribed value too."""
         return None if failure.last is None else self.record(failure.last)
 
-    def _is_held(self) -> bool:
-        """Whether no motion of the joints moves the force's point along its direction."""
-        assert self._start is not None, "steps that fail have started"
-        joints, state = self._joints, self._start.state
+    def _is_held(self, state: State) -> bool:
+        """Whether no motion that the joints leave at ``state`` moves the force's point along its direction."""
+        joints = self._joints
         rate = np.zeros(joints.size)
         for point, direction in self._system.controlled.acting:
             if not isinstance(point, BodyPoint):

@@ -4,6 +4,8 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
+from fenicsmech.continuation import LoadSteps
+from fenicsmech.equilibrium import EquilibriumSolver
 
 
 def driven_crank(*effects) -> tuple[fm.Simulation, object]:
@@ -19,13 +21,22 @@ def driven_crank(*effects) -> tuple[fm.Simulation, object]:
     return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
 
 
-def test_point_held_by_a_motor_is_named():
+def test_point_held_by_a_motor_is_named_after_few_solves(monkeypatch):
     simulation, push = driven_crank()
+    tried, solve = [], EquilibriumSolver.solve
+
+    def counted(self, start, control):
+        tried.append(control.prescribed)
+        return solve(self, start, control)
+
+    monkeypatch.setattr(EquilibriumSolver, "solve", counted)
     with pytest.raises(fm.EquilibriumError) as caught:
         simulation.load_displacement(push, displacements=[0.01])
     assert "'push'" in caught.value.part
     assert "joints and motors hold its point" in caught.value.problem
     assert caught.value.last is not None
+    most = LoadSteps().failures_held
+    assert most < len(set(tried)) <= most + 2 and len(tried) <= 2 * most + 2  # with and without turning links
 
 
 def test_point_held_by_a_joint_that_gives_way_moves():
