@@ -23,7 +23,8 @@ the same on all processes and machines, and not by time:
        5, or those that do not                                 comes first
     7. half the step, or 3/4 of the way to the fold that       ``LoadSteps.smallest``, or ``failures`` in a row
        the tangents predict before the value that failed
-    8. the nearest equilibrium found past a fold, a snap       one
+    8. the nearest equilibrium found past a fold, a snap; if   one; as many as the distance can be halved
+       there is none, at 2, 4, … times the last step
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre                                    not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -248,8 +249,10 @@ class LoadStepper(Stepper):
                 step = 0.5 * (value - self._value)
                 if abs(step) > steps.smallest * self._scale(distance) and failed < steps.failures:
                     continue
+                fold = self._fold(tried[-1])
+                if beyond is None and fold is not None:
+                    beyond = self._past_fold(value, control)
                 if beyond is None:
-                    fold = self._fold(tried[-1])
                     raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
                 point, snapped, step = beyond, True, beyond.control.prescribed - self._value
             if snapped:
@@ -264,7 +267,9 @@ class LoadStepper(Stepper):
             self._accept_at(point)
             if self._value == control.prescribed:
                 return point
-            failed, beyond = 0, None
+            failed = 0
+            if beyond is not None and (beyond.control.prescribed - self._value) * distance <= 0.0:
+                beyond = None
             if changed and not halved:
                 step = control.prescribed - self._value
             elif point.iterations <= steps.iterations:
@@ -292,6 +297,18 @@ class LoadStepper(Stepper):
             return None
         ahead = self._width / (growth**2 - 1.0)
         return self._value + ahead if 0.0 < ahead / beyond <= self._steps.fold_ahead else None
+
+    def _past_fold(self, tried: float, control: Control) -> EquilibriumPoint | None:
+        """The equilibrium after a snap: at twice the distance of the value ``tried``, four times that, … up to
+        ``control``'s; None if none is found."""
+        ahead, remaining = 2.0 * (tried - self._value), control.prescribed - self._value
+        while abs(ahead) < 2.0 * abs(remaining):
+            beyond = control.at(self._value + min(ahead, remaining, key=abs))
+            try:
+                return self._correct(self._points[-1].state, beyond)
+            except NotConverged:
+                ahead *= 2.0
+        return None
 
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent limits the first step."""
@@ -436,6 +453,10 @@ class DeadCentreStepper(LoadStepper):
             if failure.last is None or not self._pass_dead_centre(failure.last, failure.tried[-1], control):
                 raise
         return super().advance(control)
+
+    def _past_fold(self, tried: float, control: Control) -> EquilibriumPoint | None:
+        """None: what looks like a fold may be a dead centre, and after one descent leads farther (see the table)."""
+        return None
 
     def _pass_dead_centre(self, last: EquilibriumPoint, tried: float, control: Control) -> bool:
         """Continues from the ``last`` equilibrium by straining links, past a dead centre before the value that was
