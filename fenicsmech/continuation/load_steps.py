@@ -391,8 +391,11 @@ class LoadStepper(Stepper):
         return limited if abs(limited) > self._steps.smallest_limited * abs(distance) else step
 
     def _before_fold(self, step: float, failing: float | None, distance: float) -> float:
-        """``step``, shortened to a part of the way to the fold if the path turns back before the ``failing`` value."""
-        if failing is None or (fold := self._fold(failing)) is None:
+        """``step``, shortened to a part of the way to the fold if the path turns back before the ``failing`` value.
+
+        Under contact a tangent that grows may end at an obstacle, and halved steps come to equilibria set aside.
+        """
+        if failing is None or self.system.contact is not None or (fold := self._fold(failing)) is None:
             return step
         least = 2.0 * self._steps.smallest * self._scale(distance)  # which ends the steps if it fails
         return math.copysign(min(abs(step), max(self._steps.fold_part * abs(fold - self._value), least)), step)
