@@ -15,9 +15,10 @@ at the integration points, S eliminated, has the same residual as the one in dis
 
     K_uu + ∫ ∇v ΔS : ∇w dV,     ΔS = S(u) + ∂S/∂E : δE − S(u + δu),
 
-which is K_uu once steps are small. Source: Magisano, Leonetti, Garcea, "How to improve efficiency and robustness of the
-Newton method in geometrically non-linear structural problem discretized via displacement-based finite elements"
-(Computer Methods in Applied Mechanics and Engineering 313, 2017, doi:10.1016/j.cma.2016.10.023), the MIP Newton.
+which is K_uu once steps are small. In u–p form S(u, p) is predicted with δp too. Source: Magisano, Leonetti, Garcea,
+"How to improve efficiency and robustness of the Newton method in geometrically non-linear structural problem
+discretized via displacement-based finite elements" (Computer Methods in Applied Mechanics and Engineering 313, 2017,
+doi:10.1016/j.cma.2016.10.023), the MIP Newton.
 """
 
 from __future__ import annotations
