@@ -21,10 +21,8 @@ the same on all processes and machines, and not by time:
     5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
     6. steps that turn links (``equilibrium.turning``), 1 to   as these; the kind that led to the last equilibrium
        5, or those that do not                                 comes first
-    7. half the step, or 3/4 of the way to the fold that       ``LoadSteps.smallest``, or ``failures`` in a row
-       the tangents predict before the value that failed
-    8. the nearest equilibrium found past a fold, a snap; if   one; as many as the distance can be halved
-       there is none, at 2, 4, … times the last step
+    7. half the step                                           ``LoadSteps.smallest``, or ``failures`` in a row
+    8. the nearest equilibrium found past a fold, a snap       one
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre                                    not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -64,7 +62,6 @@ with x held:
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from fenicsmech.collective import agreed
@@ -99,7 +96,6 @@ class LoadSteps:
         smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap.
         fold_growth: growth of the tangent over the last step from which the path counts as turning back.
         fold_ahead: largest distance ahead at which it does, over the last step that failed.
-        fold_part: of the way to the fold that a step takes once one beyond it has failed.
         minimum_shift: least shift of the KKT matrix, in units of links' stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
@@ -125,7 +121,6 @@ class LoadSteps:
     smallest_snap_step: float = 1.0 / 64.0
     fold_growth: float = 1.1
     fold_ahead: float = 4.0
-    fold_part: float = 0.75
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
     arc_steps: int = 300
@@ -226,33 +221,30 @@ class LoadStepper(Stepper):
             self._settle(control.at(self._value))
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
-        failing: float | None = None  # the last value without equilibrium, or beyond a fold
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
         # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
         aside, halved = dict[float, EquilibriumPoint](), False
         while True:
             remaining = control.prescribed - self._value
-            step = self._before_fold(self._limited(step, distance), failing, distance)
+            step = self._limited(step, distance)
             arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.prescribed if arrives else self._value + step
             try:
                 point = aside.pop(value, None) or self._correct(self._guess(control.at(value)), control.at(value))
                 snapped = self._snapped(point)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
-                    step, beyond, halved, failing = 0.5 * (value - self._value), point, True, value
+                    step, beyond, halved = 0.5 * (value - self._value), point, True
                     if self.system.contact is not None:
                         aside[value] = point
                     continue
             except NotConverged as failure:
                 tried.append(value)
-                failed, halved, failing = failed + 1, True, value
+                failed, halved = failed + 1, True
                 step = 0.5 * (value - self._value)
                 if abs(step) > steps.smallest * self._scale(distance) and failed < steps.failures:
                     continue
-                fold = self._fold(tried[-1])
-                if beyond is None and fold is not None:
-                    beyond = self._past_fold(value, control)
                 if beyond is None:
+                    fold = self._fold(tried[-1])
                     raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
                 point, snapped, step = beyond, True, beyond.control.prescribed - self._value
             if snapped:
@@ -267,9 +259,7 @@ class LoadStepper(Stepper):
             self._accept_at(point)
             if self._value == control.prescribed:
                 return point
-            failed = 0
-            if beyond is not None and (beyond.control.prescribed - self._value) * distance <= 0.0:
-                beyond = None
+            failed, beyond = 0, None
             if changed and not halved:
                 step = control.prescribed - self._value
             elif point.iterations <= steps.iterations:
@@ -297,18 +287,6 @@ class LoadStepper(Stepper):
             return None
         ahead = self._width / (growth**2 - 1.0)
         return self._value + ahead if 0.0 < ahead / beyond <= self._steps.fold_ahead else None
-
-    def _past_fold(self, tried: float, control: Control) -> EquilibriumPoint | None:
-        """The equilibrium after a snap: at twice the distance of the value ``tried``, four times that, … up to
-        ``control``'s; None if none is found."""
-        ahead, remaining = 2.0 * (tried - self._value), control.prescribed - self._value
-        while abs(ahead) < 2.0 * abs(remaining):
-            beyond = control.at(self._value + min(ahead, remaining, key=abs))
-            try:
-                return self._correct(self._points[-1].state, beyond)
-            except NotConverged:
-                ahead *= 2.0
-        return None
 
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent limits the first step."""
@@ -390,16 +368,6 @@ class LoadStepper(Stepper):
         limited = step * min(1.0, self._steps.motion / max(motion, self._steps.motion))
         return limited if abs(limited) > self._steps.smallest_limited * abs(distance) else step
 
-    def _before_fold(self, step: float, failing: float | None, distance: float) -> float:
-        """``step``, shortened to a part of the way to the fold if the path turns back before the ``failing`` value.
-
-        Under contact a tangent that grows may end at an obstacle, and halved steps come to equilibria set aside.
-        """
-        if failing is None or self.system.contact is not None or (fold := self._fold(failing)) is None:
-            return step
-        least = 2.0 * self._steps.smallest * self._scale(distance)  # which ends the steps if it fails
-        return math.copysign(min(abs(step), max(self._steps.fold_part * abs(fold - self._value), least)), step)
-
     def _scale(self, distance: float) -> float:
         """Reference length of steps: the distance covered so far, at first the first step, whatever the end.
 
@@ -456,10 +424,6 @@ class DeadCentreStepper(LoadStepper):
             if failure.last is None or not self._pass_dead_centre(failure.last, failure.tried[-1], control):
                 raise
         return super().advance(control)
-
-    def _past_fold(self, tried: float, control: Control) -> EquilibriumPoint | None:
-        """None: what looks like a fold may be a dead centre, and after one descent leads farther (see the table)."""
-        return None
 
     def _pass_dead_centre(self, last: EquilibriumPoint, tried: float, control: Control) -> bool:
         """Continues from the ``last`` equilibrium by straining links, past a dead centre before the value that was

@@ -306,7 +306,13 @@ class CurveStepper:
                 continue
             finally:
                 iterations += point.iterations + stepper.iterations
-            _log.warning("%s: the path of %s turns back; curves start after a snap", self.request.where, what)
+            _log.warning(
+                "%s: between %g and %g the path turns back; curves start after a snap of %s",
+                self.request.where,
+                reached,
+                beyond.prescribed,
+                what,
+            )
             self._effort += Effort(iterations, 1)
             return state
         return None
