@@ -443,16 +443,14 @@ class DeadCentreStepper(LoadStepper):
             except NotConverged:
                 if found:  # nearer by it would be too
                     return False
-                step *= 0.5
-                continue
-            found = True
-            if self._left_path(last, rate, step, point, closing):
-                step *= 0.5
-                continue
-            _log.info("links strain beyond a dead centre near %g", self._value)
-            self._rate, self._points, self._start = None, [], last.state
-            self._accept_at(point)
-            return True
+            else:
+                found = True
+                if not self._left_path(last, rate, step, point, closing):
+                    _log.info("links strain beyond a dead centre near %g", self._value)
+                    self._rate, self._points, self._start = None, [], last.state
+                    self._accept_at(point)
+                    return True
+            step *= 0.5
         return False
 
     def _left_path(
