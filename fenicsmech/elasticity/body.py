@@ -82,13 +82,14 @@ class ElasticBody(BodyFields):
         """The measure of all cells that can deform, with quadrature of ``degree``."""
         return _sum(term.dx(metadata={"quadrature_degree": degree}) for term in self.terms)
 
-    def densities(self, H) -> list[tuple]:
-        """Elastic energy per volume of the mesh at the gradient H on the rest shape, and where it holds, per law."""
+    def densities(self, H, p=None) -> list[tuple]:
+        """Elastic energy per volume of the mesh at the gradient H on the rest shape and the pressure p (default: the
+        body's), and where it holds, per law."""
         found, elastic = [], self._elastic(H)
         for term in self.terms:
             strain = self.model.strain(term.law, elastic)
             if self.pressure is not None and term.mixed:
-                density = term.law.mixed_energy(strain, self.pressure.p)
+                density = term.law.mixed_energy(strain, self.pressure.p if p is None else p)
             else:
                 density = term.law.energy(strain)
             found.append((density * self._volume, term.dx))
@@ -384,10 +385,10 @@ class PredictedStress:
         )
         v, w = (body.gradient(argument) for argument in (ufl.TestFunction(space), ufl.TrialFunction(space)))
         F = ufl.Identity(body.model.dim) + body.gradient(body.u)
-        earlier = dict(zip(body.fields, self._before, strict=True))
         forces, stiffness = [], []
-        for present, measure in self._stresses():
-            before = ufl.replace(present, earlier)
+        for (before, measure), (present, _) in zip(
+            self._stresses(self._before), self._stresses(body.fields), strict=True
+        ):
             rates = [ufl.derivative(before, *pair) for pair in zip(self._before, self._motion, strict=True)]
             change = sum(rates, start=before) - present
             forces.append(ufl.inner(ufl.dot(F, change), v) * measure)
@@ -419,11 +420,11 @@ class PredictedStress:
         else:
             add_blocks(matrix, [[self._stiffness, None], [None, self._no_compliance]])
 
-    def _stresses(self):
-        """Second Piola–Kirchhoff stress S = F⁻¹ ∂W/∂F per volume of the mesh, and where it holds, per law."""
-        H = ufl.variable(self._body.gradient(self._body.u))
+    def _stresses(self, fields: list[fem.Function]):
+        """Second Piola–Kirchhoff stress S(u, p) = F⁻¹ ∂W/∂F per volume of the mesh, and where it holds, per law."""
+        H = ufl.variable(self._body.gradient(fields[0]))
         F = ufl.Identity(self._body.model.dim) + H
-        for work, measure in self._body.densities(H):
+        for work, measure in self._body.densities(H, *fields[1:]):
             stress = ufl.dot(ufl.inv(F), ufl.diff(work, H))
             yield 0.5 * (stress + ufl.transpose(stress)), measure
 
