@@ -1,6 +1,6 @@
 """Constrained optimisers compared: this package's SQP, scipy's SLSQP and trust-constr, NLopt's MMA and CCSA.
 
-    OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.constrained [--limit EVALUATIONS]
+    OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.constrained [--limit EVALUATIONS] [--methods NAME …]
 
 Two tables: evaluations until each method ends by itself, on formulas with known optima and on designs of the truss
 finger in plane stress. In brackets the relative error of the objective, of designs against the best that a method
@@ -10,7 +10,7 @@ much they are. NLopt takes part if it is installed (python3-nlopt).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 
@@ -32,7 +32,7 @@ from fenicsmech.design import (
     TooHigh,
 )
 from fenicsmech.report import format_table
-from fenicsmech.symbolic import derive
+from fenicsmech.symbolic import SmoothFunction
 
 from .mechanisms import Case, mechanism
 from .table import command, publish
@@ -112,7 +112,7 @@ class FormulaProblem:
     def __init__(self, formulas: Formulas, *, unit: float = 1.0, units: float | np.ndarray = 1.0) -> None:
         symbols = {f"x{k + 1}": sympy.Symbol(f"p{k}", real=True) for k in range(len(formulas.start))}
         self._parts = [
-            derive([sympy.sympify(text, symbols) for text in texts], list(symbols.values()), [])
+            SmoothFunction([sympy.sympify(text, symbols) for text in texts], list(symbols.values()), [])
             for texts in ((formulas.objective, formulas.domain), formulas.residuals, formulas.inequalities)
         ]
         self.names, self.unit, self.units = formulas.inequalities, unit, units
@@ -258,23 +258,24 @@ def _rank(found: Evaluation) -> tuple[float, float]:
     return (0.0, found.value) if violation <= SATISFIED else (violation, found.value)
 
 
-def methods(limit: int, tolerance: float) -> dict[str, fm.Optimiser]:
-    """The optimisers that are installed, by their names in the tables."""
+def methods(limit: int, tolerance: float, chosen: Sequence[str] | None = None) -> dict[str, fm.Optimiser]:
+    """The optimisers that are installed, or those ``chosen`` of them, by their names in the tables."""
     names = {"scipy SLSQP": "SLSQP", "scipy trust-constr": "trust-constr"}
     if find_spec("nlopt"):
         names |= {"NLopt SLSQP": "LD_SLSQP", "NLopt MMA": "LD_MMA", "NLopt CCSA": "LD_CCSAQ"}
-    return {"SQP": fm.SQP(iterations=limit, tolerance=tolerance)} | {
+    found = {"SQP": fm.SQP(iterations=limit, tolerance=tolerance)} | {
         name: Library(iterations=limit, method=method, tolerance=tolerance) for name, method in names.items()
     }
+    return {name: found[name] for name in chosen or found}
 
 
-def on_formulas(limit: int) -> list[list[str]]:
+def on_formulas(limit: int, chosen: Sequence[str]) -> list[list[str]]:
     """Rows: evaluations of each method, with the relative error of the objective."""
     rows = []
     for name, formulas in KNOWN.items():
         cells = []
         best = FormulaProblem(formulas).evaluate(np.array(formulas.optimum, dtype=float)).value
-        for optimiser in methods(limit, 1e-6).values():
+        for optimiser in methods(limit, 1e-6, chosen).values():
             problem = FormulaProblem(formulas)
             found = optimiser.minimise(problem, Start(problem.start), watch=lambda iterate: None).evaluation
             error = abs(found.value - best) / max(1.0, abs(best))
@@ -317,13 +318,13 @@ def inequalities_of(truss: Case, sim: fm.Simulation) -> dict[str, list[fm.Target
     }
 
 
-def on_designs(limit: int, size: float) -> list[list[str]]:
+def on_designs(limit: int, size: float, chosen: Sequence[str]) -> list[list[str]]:
     """Rows: evaluations of each method through the public calls, with the relative error of the objective."""
     truss, rows = mechanism("truss"), []
     sim = fm.Simulation(truss.scene, space="plane-stress", size=size)
     for name, targets in inequalities_of(truss, sim).items():
         found = []
-        for optimiser in methods(limit, 1e-4).values():
+        for optimiser in methods(limit, 1e-4, chosen).values():
             try:
                 found.append(fm.DesignProblem(sim, truss.designs, targets=targets).optimise(optimiser=optimiser))
             except fm.EquilibriumError:  # it ended where nothing carries the loads
@@ -347,14 +348,15 @@ def _kept(result: fm.DesignResult) -> bool:
 
 
 def main() -> None:
-    parser = command(__doc__)
+    parser, names = command(__doc__), tuple(methods(1, 1.0))
     parser.add_argument("--limit", type=int, default=100, help="most evaluations (default 100)")
     parser.add_argument("--size", type=float, default=3.0, metavar="MM", help="element size (default 3 mm)")
+    parser.add_argument("--methods", nargs="+", choices=names, metavar="NAME", help=f"of {', '.join(names)}")
     options = parser.parse_args()
-    names = tuple(methods(1, 1.0))
+    chosen = options.methods or names
     tables = [
-        format_table(("formulas", *names), on_formulas(options.limit)),
-        format_table(("design", *names), on_designs(options.limit, options.size)),
+        format_table(("formulas", *chosen), on_formulas(options.limit, chosen)),
+        format_table(("design", *chosen), on_designs(options.limit, options.size, chosen)),
     ]
     publish("constrained", "\n\n".join(tables), write=options.write)
 

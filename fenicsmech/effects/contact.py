@@ -28,7 +28,7 @@ from fenicsmech.effects.link_fields import Faces, LinkFields
 from fenicsmech.errors import DescriptionError, direction, in_plane, point, points, positive, set_fields
 from fenicsmech.mechanism import Effect, FlexibleLink, Link, RigidLink, in_dimension
 from fenicsmech.multibody import Linkage, PosePotential
-from fenicsmech.symbolic import SmoothFunction, derive
+from fenicsmech.symbolic import SmoothFunction
 
 _FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
 
@@ -456,4 +456,4 @@ class TouchingPoints(PosePotential):
 def smooth_gap(obstacle: Obstacle, dim: int) -> SmoothFunction:
     """g at many points in ``dim`` dimensions, of their coordinates and the obstacle's numbers, with its derivatives."""
     x, numbers = sympy.symbols(f"x:{dim}"), sympy.symbols(f"c:{len(obstacle.numbers)}")
-    return derive([obstacle.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)
+    return SmoothFunction([obstacle.gap(x, numbers, sympy.sqrt)], x, numbers, many=True)

@@ -35,7 +35,7 @@ from functools import cache
 import sympy
 
 from fenicsmech.joints.rotations import RIGID_SPACES
-from fenicsmech.symbolic import SmoothFunction, derive
+from fenicsmech.symbolic import SmoothFunction
 
 
 @dataclass(frozen=True)
@@ -260,7 +260,7 @@ def constraint(kind: JointKind, dim: int, driven: bool) -> SmoothFunction:
     Variables are the poses z_a and z_b and, if ``driven``, φ, (2 pose_size,) or (2 pose_size + 1,). Constants are the
     joint's position minus the centres of both bodies and the rows of its triad, all as drawn, (2 dim + dim²,).
     """
-    return derive(*_equations(kind, dim, driven))
+    return SmoothFunction(*_equations(kind, dim, driven))
 
 
 @cache
@@ -292,14 +292,14 @@ def _rate(formulae, variables, constants) -> SmoothFunction:
     along = [
         sum((sympy.diff(f, c) * rate for c, rate in zip(constants, rates, strict=True)), sympy.S.Zero) for f in formulae
     ]
-    return derive(along, variables, (*constants, *rates))
+    return SmoothFunction(along, variables, (*constants, *rates))
 
 
 @cache
 def free_coordinate(kind: JointKind, dim: int) -> SmoothFunction:
     """The free coordinate φ of ``kind``, (1,); variables and constants are those of a ``constraint`` without motor."""
     poses, constants, a, b = _markers(dim)
-    return derive([kind.coordinate(a, b)], poses, constants)
+    return SmoothFunction([kind.coordinate(a, b)], poses, constants)
 
 
 def _markers(dim: int):
