@@ -1,6 +1,7 @@
 """Accuracy control against an exhaustive search: errors that remain, and seconds spent.
 
     OPENBLAS_NUM_THREADS=1 python3 -m benchmarks.accuracy_control [truss|claw|klann …] [--accuracy A …] [--repeats N]
+                                                                  [--levels N]
 
 For each mechanism and accuracy: the fidelity level that Simulation(scene, accuracy=A) chose, the bound on the error of
 its corrected results, their true error (against the finest level with its estimate added), with and without the
@@ -82,13 +83,15 @@ def main():
     parser.add_argument("mechanisms", nargs="*", default=NAMES, help="truss, claw, klann (default: all)")
     parser.add_argument("--accuracy", type=float, nargs="+", default=ACCURACIES, help="default: 0.05 0.01 0.002")
     parser.add_argument("--repeats", type=int, default=3, help="runs of which the fastest count (default: 3)")
+    parser.add_argument("--levels", type=int, help="of half the depth, from coarse to fine (default: all)")
     options = parser.parse_args()
     if MPI.COMM_WORLD.size > 1:
         parser.error("it goes by the time of one process; run it without mpirun")
     rows, reports = [], []
     for name in options.mechanisms:
         case = Case(name)
-        *levels, finest_level = [*fidelity_levels(PLANE_STRESS), *fidelity_levels(MID_PLANE_SYMMETRIC)]
+        spatial = fidelity_levels(MID_PLANE_SYMMETRIC)[: options.levels]
+        *levels, finest_level = [*fidelity_levels(PLANE_STRESS), *spatial]
         # the second run does not compile; the finest is too slow to count
         brute = [(level, *[timed(at_level, case, level) for _ in range(2)][1]) for level in levels]
         brute.append((finest_level, *timed(at_level, case, finest_level)))

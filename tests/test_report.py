@@ -123,7 +123,7 @@ def test_targets_are_marked_on_curves_of_their_own_force(tmp_path, monkeypatch):
     (push,) = case.scene.mechanism.forces
     drag = case.scene.mechanism.force(on=push.on, at=(20, 70), direction=(-1, 0), name="drag")
     targets = [*case.targets, fm.Target(drag, force=0.05, displacement=1.0)]
-    problem = fm.DesignProblem(case.simulate(), case.designs, targets=targets)
+    problem = fm.DesignProblem(case.simulate(size=6.0, order=1), case.designs, targets=targets)
     result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1))
     monkeypatch.setattr("fenicsmech.report.plot_curve", lambda *_, targets, **__: marked.extend(targets))
     for part, expected in ((push, (WANTED, 0.1)), (drag, (1.0, 0.05))):
@@ -135,7 +135,7 @@ def test_targets_are_marked_on_curves_of_their_own_force(tmp_path, monkeypatch):
 
 def test_points_are_shown_where_finer_elements_put_the_unknown_of_the_curve(tmp_path, monkeypatch):
     case, shown = truss((0.1, WANTED)), []
-    simulation, (push,) = case.simulate(), case.scene.mechanism.forces
+    simulation, (push,) = case.simulate(size=6.0), case.scene.mechanism.forces
     monkeypatch.setattr("fenicsmech.report.plot_curve", lambda _, series, **__: shown.extend(series))
     for given, known in (({"forces": [0.05, 0.1]}, 1), ({"displacements": [1.0, 2.0]}, 0)):
         shown.clear()

@@ -1,7 +1,5 @@
 """Scripts run on two ranks as they are: each file is written once, each line printed once, an error ends all."""
 
-import pytest
-
 import fenicsmech as fm
 
 RANKS = 2
@@ -36,21 +34,13 @@ for write in (
 """
 
 
-def test_files_are_written_and_lines_printed_once(mpirun, tmp_path, monkeypatch):
+def test_files_are_written_and_lines_printed_once_and_errors_raised_on_all_ranks(mpirun, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "script.py").write_text(DESCRIPTION + WRITING)
+    (tmp_path / "file").write_text("no folder")
+    (tmp_path / "script.py").write_text(DESCRIPTION + WRITING + FAILING)
     done = mpirun(RANKS, "script.py")
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("bends|") == 1
-    assert {path.name for path in tmp_path.iterdir()} == {"script.py", "curve.png", "curve.csv", "both.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {"script.py", "file", "curve.png", "curve.csv", "both.png"}
     assert {len(column) for column in fm.read_csv("curve.csv").values()} == {3}
-
-
-@pytest.mark.thorough
-def test_a_file_that_cannot_be_written_is_an_error_on_all_ranks(mpirun, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "file").write_text("no folder")
-    (tmp_path / "script.py").write_text(DESCRIPTION + FAILING)
-    done = mpirun(RANKS, "script.py")
-    assert done.returncode == 0, done.stderr
     assert done.stdout.count("refused") == 3 * RANKS

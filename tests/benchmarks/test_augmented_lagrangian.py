@@ -7,16 +7,22 @@ import fenicsmech as fm
 from benchmarks.solvers import AugmentedLagrangian
 from fenicsmech.equilibrium import DisplacementControl, LoadControl
 
-from ..equilibrium.crowded import control_of, crowded, random_state, system_of
+from ..equilibrium.crowded import Crowded, control_of, crowded, random_state, system_of
 
 SOFTNESS = 0.05
 H = 1e-3
 
 
+SPACES = ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)]
+
+
+@pytest.fixture(scope="module", params=SPACES)
+def case(request) -> Crowded:
+    return crowded(request.param)
+
+
 @pytest.mark.parametrize("kind", [LoadControl, DisplacementControl])
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", pytest.param("3d", marks=pytest.mark.thorough)])
-def test_gradient_and_matrix_are_derivatives_of_the_value(space, kind):
-    case = crowded(space)
+def test_gradient_and_matrix_are_derivatives_of_the_value(case, kind):
     system, control = system_of(case, controlled=case.on_rigid), control_of(kind)
     solver = AugmentedLagrangian().solver(system)
     state = control.prepare(random_state(case, system))
@@ -68,7 +74,7 @@ def test_rounding_of_redundant_hinges_ends_iterations():
     push = made.force(on=left, at=(0, 40), direction=(1, 0))
     found = []
     for solver in (fm.PrimalDualNewton(), AugmentedLagrangian()):
-        simulation = fm.Simulation(fm.Scene(made), space="3d", order=1, size=4.0, solver=solver)
+        simulation = fm.Simulation(fm.Scene(made), space="3d", order=1, size=6.0, solver=solver)
         curve = simulation.load_displacement(push, forces=[2.0])
         assert curve.freedom.redundancy > 0
         assert curve.frames[0].iterations < 15

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fenicsmech as fm
 from benchmarks import laws
 from benchmarks.stress import designs
 from benchmarks.table import publish
@@ -32,8 +33,9 @@ def test_a_written_table_is_what_was_printed(tmp_path, capsys):
     assert (tmp_path / "sizes.md").read_text() == capsys.readouterr().out.rstrip("\n") + "\n"
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("case", [case for case in laws.CASES if case.published], ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case", [case for case in laws.CASES if case.published and len(case.kinds) == 1], ids=lambda case: case.name
+)
 def test_no_published_parameters_fit_treloars_tests_better_than_ours(case):
     fit = case.fit()
 
@@ -45,6 +47,23 @@ def test_no_published_parameters_fit_treloars_tests_better_than_ours(case):
     assert size(tuple(ours)) <= size(case.published)
 
 
+@pytest.mark.parametrize("kind", laws.KINDS)
+@pytest.mark.parametrize(
+    "law",
+    [
+        fm.Ogden((0.63, 0.0012, -0.01), (1.3, 5.0, -2.0), 0.4999999),
+        fm.Yeoh(0.2, -2e-3, 5e-5, 0.4999999),
+        fm.MooneyRivlin(0.17, 5e-3, 0.4999999),
+    ],
+    ids=lambda law: type(law).__name__,
+)
+def test_closed_forms_are_stresses_of_rubber_that_keeps_its_volume(law, kind):
+    *numbers, _ = law.parameters.values()
+    stretches = np.array([1.1, 2.0, 4.0])
+    expected = laws.closed_form(law, tuple(numbers), kind, stretches)
+    assert fm.specimen_stress(law, kind, stretches) == pytest.approx(expected, rel=1e-4)
+
+
 @pytest.mark.parametrize("test", [case.test for case in CASES])
 def test_lines_of_the_verification_name_tests_that_exist(test):
     file, _, function = test.partition("::")
@@ -54,15 +73,13 @@ def test_lines_of_the_verification_name_tests_that_exist(test):
 
 @pytest.mark.thorough
 def test_curves_of_the_drawn_mechanisms():
-    rows = {row[0]: row for row in printed("frames", "--space", "plane-stress", "--size", "0.8")}
-    expected = {"truss": 1.7555, "claw": 11.907, "klann": 11.562}  # mm
-    for name, displacement in expected.items():
-        assert float(rows[name][2]) == pytest.approx(displacement, rel=0.005)
+    *_, row = printed("frames", "truss", "--space", "plane-stress")
+    assert row[0] == "truss" and float(row[2]) == pytest.approx(1.7555, rel=0.005)  # mm, with elements of 0.8 mm
 
 
 @pytest.mark.thorough
 def test_effects_move_the_finger_and_none_moves_nothing():
-    rows = {row[0]: row for row in printed("effects", "--space", "plane-stress", "--size", "3")}
+    rows = {row[0]: row for row in printed("effects", "--space", "plane-stress", "--size", "6")}
     moved = {name: float(row[-1]) for name, row in list(rows.items())[2:]}
     assert moved.pop("none") == moved.pop("none, again") == 0.0
     assert moved["joint spring"] < 0.0 < moved["joint compliance"]
@@ -78,14 +95,15 @@ def test_a_limit_of_stress_on_the_claw_holds_beside_its_targets():
 
 
 @pytest.mark.slow
-def test_both_optimisers_reach_the_targets_of_the_truss():
-    for row in printed("optimisers", "truss")[2:]:
-        assert float(row[6]) < 1.0 and row[-1] == "yes"
+def test_levenberg_marquardt_gains_more_in_ten_iterations_than_bfgs():
+    *_, ours, other = printed("optimisers", "truss", "--size", "3", "--limit", "10")
+    assert (ours[2], other[2]) == ("LevenbergMarquardt", "BFGS")
+    assert float(ours[7]) < float(other[7])  # objectives
 
 
 @pytest.mark.thorough
 def test_sqp_solves_every_formula_and_every_design_under_inequalities():
-    rows = printed("constrained", "--limit", "60")
+    rows = printed("constrained", "--limit", "60", "--methods", "SQP", "scipy SLSQP")
     split = next(k for k, row in enumerate(rows) if row[0] == "design")
     formulas, designs = rows[2:split], rows[split + 2 :]
     assert rows[0][1] == rows[split][1] == "SQP" and len(formulas) == 9 and len(designs) == 3
@@ -95,21 +113,21 @@ def test_sqp_solves_every_formula_and_every_design_under_inequalities():
 
 @pytest.mark.slow
 def test_accuracy_control_is_as_accurate_as_requested_on_the_truss():
-    *_, row = printed("accuracy_control", "truss", "--accuracy", "0.05", "--repeats", "1")
+    *_, row = printed("accuracy_control", "truss", "--accuracy", "0.05", "--repeats", "1", "--levels", "2")
     asked, bound, error = (float(row[column].rstrip("%")) for column in (1, 3, 4))
     assert error <= asked and bound <= asked
 
 
 @pytest.mark.slow
 def test_stopping_early_moves_less_than_the_elements_err():
-    table = printed("stopping", "--mechanisms", "truss", "--size", "3", "--repeats", "1")
+    table = printed("stopping", "--mechanisms", "truss", "--size", "5", "--repeats", "1")
     moved = [float(row[-1]) for row in table if row[0] == "truss" and len(row) == 5]
     assert len(moved) == 5 and max(moved) < 0.1
 
 
 @pytest.mark.slow
 def test_predictors_and_quadratures_give_the_same_displacement():
-    table = printed("performance", "--space", "plane-stress", "--size", "3")
+    table = printed("performance", "--space", "plane-stress", "--size", "6")
     shifts = {row[0]: abs(float(row[-1])) for row in table if len(row) == 6 and row[-1][-4:-2] in ("e-", "e+")}
     assert max(shift for name, shift in shifts.items() if name.startswith("predictor")) < 1e-7
     assert max(shift for name, shift in shifts.items() if name.startswith("quadrature")) < 1e-2
@@ -117,7 +135,7 @@ def test_predictors_and_quadratures_give_the_same_displacement():
 
 @pytest.mark.thorough
 def test_a_run_that_takes_too_long_is_stopped_and_marked():
-    *_, row = printed("solvers", "truss, whole load at once", "--limit", "0")
+    *_, row = printed("solvers", "elastica, a tenth of it at once", "--limit", "0")
     assert row[1:] and set(row[1:]) == {"stopped after 0 s"}
 
 
@@ -134,7 +152,7 @@ def test_two_levels_the_factor_and_algebraic_multigrid_agree():
 
 @pytest.mark.thorough
 def test_optimal_handles_stretch_cells_less_than_naive_ones():
-    naive, optimal = ([float(cell) for cell in row[1:]] for row in printed("handles")[2:])
+    naive, optimal = ([float(cell) for cell in row[1:]] for row in printed("handles", "--size", "3")[2:])
     cells, mean, most, inverted, sizes = zip(naive, optimal, strict=True)
     assert cells[0] == cells[1] and inverted[1] == 0
     assert mean[1] - 1.0 < 0.75 * (mean[0] - 1.0)  # half of ρ is 1 in an equilateral triangle
@@ -143,8 +161,8 @@ def test_optimal_handles_stretch_cells_less_than_naive_ones():
 
 @pytest.mark.thorough
 def test_parts_of_the_switch_meet_their_targets_and_are_kept(tmp_path):
-    options = ("switch", "--size", "2", "--results", str(tmp_path))
+    options = ("switch", "--size", "3", "--results", str(tmp_path))
     first = printed("parts", *options)[2:]
-    assert [path.name for path in tmp_path.iterdir()] == ["switch-2.json"]
+    assert [path.name for path in tmp_path.iterdir()] == ["switch-3.json"]
     assert len(first) == 2 and all(row[0] == "switch" and abs(float(row[-1])) < 1.0 for row in first)
     assert printed("parts", *options)[2:] == first

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,12 +17,21 @@ from .mechanisms import Case, strained, truss
 REACHABLE = ((0.1, 2.0), (0.4, 3.2))
 
 
-def test_resuming_without_a_checkpoint_starts_from_the_beginning(tmp_path):
+@pytest.fixture(scope="module")
+def after_one(tmp_path_factory) -> Path:
+    """A checkpoint after one iteration, which tests leave as it is."""
+    file = tmp_path_factory.mktemp("after one") / "checkpoint.json"
+    truss((0.4, 1.8)).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+    return file
+
+
+def test_a_checkpoint_that_is_missing_or_not_requested_is_not_used(tmp_path):
     file = tmp_path / "checkpoint.json"
-    direct = truss((0.4, 1.8)).problem().optimise()
-    resumed = truss((0.4, 1.8)).problem().optimise(checkpoint=file, resume=True)
-    assert resumed.links == direct.links
+    missing = truss((0.4, 1.8)).problem().optimise(checkpoint=file, resume=True)
     assert file.exists()
+    again = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
+    assert again.links == missing.links
+    assert again.evaluations == missing.evaluations
 
 
 def test_resuming_from_a_checkpoint_ends_where_one_run_does(tmp_path):
@@ -33,13 +44,6 @@ def test_resuming_from_a_checkpoint_ends_where_one_run_does(tmp_path):
     assert resumed.evaluations == direct.evaluations + 1
     assert resumed.objective == pytest.approx(direct.objective, rel=1e-6)
     assert resumed.links[0].parameters == pytest.approx(direct.links[0].parameters, abs=1e-5)
-
-
-def test_a_checkpoint_is_not_used_unless_requested(tmp_path):
-    file = tmp_path / "checkpoint.json"
-    first = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
-    again = truss((0.4, 1.8)).problem().optimise(checkpoint=file)
-    assert again.evaluations == first.evaluations
 
 
 def soft_truss() -> Case:
@@ -77,13 +81,11 @@ def soft_truss() -> Case:
         ("drawing", soft_truss, {}),
     ],
 )
-def test_checkpoints_of_another_problem_are_refused(differs, case, options, tmp_path):
-    file = tmp_path / "checkpoint.json"
-    truss((0.4, 1.8)).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
-    before = file.read_bytes()
+def test_checkpoints_of_another_problem_are_refused(differs, case, options, after_one):
+    before = after_one.read_bytes()
     with pytest.raises(fm.DescriptionError, match=f"another problem.*{differs}"):
-        case().problem(**options).optimise(checkpoint=file, resume=True)
-    assert file.read_bytes() == before
+        case().problem(**options).optimise(checkpoint=after_one, resume=True)
+    assert after_one.read_bytes() == before
 
 
 @pytest.mark.thorough
@@ -94,9 +96,8 @@ def test_checkpoints_of_other_motor_positions_are_refused(tmp_path):
         strained(1.0, angle=0.09).problem().optimise(checkpoint=file, resume=True)
 
 
-def test_checkpoints_of_another_optimiser_are_refused_but_not_those_of_other_limits(tmp_path):
-    file = tmp_path / "checkpoint.json"
-    truss((0.4, 1.8)).problem().optimise(optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=file)
+def test_checkpoints_of_another_optimiser_are_refused_but_not_those_of_other_limits(after_one, tmp_path):
+    file = shutil.copy(after_one, tmp_path)
     with pytest.raises(fm.DescriptionError, match="optimiser"):
         truss((0.4, 1.8)).problem().optimise(optimiser=fm.BFGS(), checkpoint=file, resume=True)
     resumed = (

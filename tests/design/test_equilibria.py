@@ -46,6 +46,10 @@ def test_following_a_design_ends_where_its_loading_from_zero_ends(name):
     assert_alike(followed, both.equilibria.from_zero())
     assert np.abs(displacements(followed) - displacements(known)).max() > 1e-3 * np.abs(displacements(known)).max()
     assert np.array_equal(followed.design.field, both.field())
+    # cases are what they claim to be
+    assert strains(both.simulation, both.equilibria.targets[0]) == (name == "strained by motors")
+    for sample, at in followed.samples.items():
+        assert (at.unloaded is not known.samples[sample].unloaded) == (name in MOVING)
 
 
 @each_case
@@ -72,33 +76,6 @@ def test_following_in_space_on_any_number_of_ranks():
     known = both.equilibria.from_zero()
     both.rest.place(both.design(0.08), first)
     assert_alike(both.equilibria.from_design(known), both.equilibria.from_zero())
-
-
-def test_displacements_are_those_of_the_curve_that_a_user_computes():
-    for name in CASES:
-        both = made(name)
-        both.rest.place(both.design(0.05), None)
-        known = both.equilibria.from_zero()
-        for target, reached in zip(both.equilibria.targets, displacements(known), strict=True):
-            curve = both.simulation.load_displacement(
-                target.quantity.part,
-                forces=[target.sample.magnitude / 2, target.sample.magnitude],
-                configuration=target.sample.configuration,
-            )
-            assert curve.displacements[-1] == pytest.approx(reached, rel=1e-8), name
-
-
-def test_cases_are_what_they_claim_to_be():
-    for name, describe in CASES.items():
-        case = describe()
-        simulation = case.simulate()
-        assert strains(simulation, case.targets[0]) == (name == "strained by motors")
-        both = bench(case, simulation)
-        first = both.rest.place(both.rest.initial, None)
-        known = both.equilibria.from_zero()
-        both.rest.place(both.design(0.05), first)
-        for sample, at in both.equilibria.from_design(known).samples.items():
-            assert (at.unloaded is not known.samples[sample].unloaded) == (name in MOVING)
 
 
 def bulged(both: Bench) -> np.ndarray:
@@ -177,11 +154,22 @@ def test_load_that_no_equilibrium_carries_is_infeasible():
 
 
 @each_case
-def test_gradients_agree_with_central_differences_of_followed_equilibria(name):
+def test_values_are_those_of_curves_and_gradients_agree_with_differences_and_do_not_disturb_the_design(name):
     both = made(name)
     placed = both.rest.place(both.design(0.05), None)
     known = both.equilibria.from_zero()
-    gradient = both.rest.gradient(placed, fields(both, known))
+    for target, reached in zip(both.equilibria.targets, displacements(known), strict=True):
+        curve = both.simulation.load_displacement(
+            target.quantity.part,
+            forces=[target.sample.magnitude / 2, target.sample.magnitude],
+            configuration=target.sample.configuration,
+        )
+        assert curve.displacements[-1] == pytest.approx(reached, rel=1e-8)
+    before = both.field()
+    first = fields(both, known)
+    assert np.array_equal(both.field(), before)
+    assert fields(both, known) == pytest.approx(first, rel=1e-12)
+    gradient = both.rest.gradient(placed, first)
     direction, step = both.direction(7), 1e-3
 
     def moved(h: float) -> np.ndarray:
@@ -190,17 +178,6 @@ def test_gradients_agree_with_central_differences_of_followed_equilibria(name):
 
     slope = (moved(step) - moved(-step)) / (2.0 * step)
     assert gradient @ direction == pytest.approx(slope, rel=1e-5)
-
-
-@each_case
-def test_gradients_do_not_disturb_the_design(name):
-    both = made(name)
-    both.rest.place(both.design(0.05), None)
-    known = both.equilibria.from_zero()
-    before = both.field()
-    first = fields(both, known)
-    assert np.array_equal(both.field(), before)
-    assert fields(both, known) == pytest.approx(first, rel=1e-12)
 
 
 def test_targets_of_several_forces_directions_and_sizes_are_told_apart():

@@ -15,9 +15,8 @@ from ..oracles.dense import taylor_rates
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("gap", [1e-2, 1e-4])
-def test_displacement_sensitivities_hold_close_to_a_limit_point(gap):
-    simulation, push = arch()
+def test_displacement_sensitivities_hold_close_to_a_limit_point():
+    gap, (simulation, push) = 1e-4, arch()
     path = simulation.follow(push, until=fm.Until(displacement=0.7 * RISE))
     force = (1.0 - gap) * path.limit_points[0].frame.force
     model = simulation.model
@@ -57,7 +56,7 @@ def nearly_snapping():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("fall", [0.012, 0.02, 0.05, 0.1, 0.3])
+@pytest.mark.parametrize("fall", [0.012, 0.02, 0.3])
 def test_design_path_across_a_fold_is_reported(nearly_snapping, fall):
     simulation, equilibria = nearly_snapping
     lowered(simulation.model, 0.0)

@@ -184,7 +184,7 @@ def test_a_link_from_a_mesh_file_keeps_its_mesh_at_the_initial_design():
 @pytest.mark.thorough
 def test_a_strip_from_a_step_file_has_the_same_optimum_as_the_strip(tmp_path):
     case = truss((0.1, 6.0), (0.4, 9.0))
-    simulation = case.simulate(size=1.5)
+    simulation = case.simulate(size=2.0)
     (diagonal,) = case.scene.mechanism.flexible_links
     (mesh,) = rest_meshes(simulation, [diagonal])
     write_step(tmp_path / "diagonal.step", mesh, depth=diagonal.shape.depth, name="diagonal")

@@ -30,8 +30,13 @@ class Block:
         return np.array([self.curve(size=size, **fidelity).displacements[0] for size in sizes])
 
 
-@pytest.mark.parametrize("space", ["plane-stress", pytest.param("plane-strain", marks=pytest.mark.thorough)])
-@pytest.mark.parametrize(("at", "along"), [((30.0, 10.0), (0.0, -1.0)), ((40.0, 0.0), (1.0, 0.0))])
+@pytest.mark.parametrize(
+    ("space", "at", "along"),
+    [
+        ("plane-stress", (30.0, 10.0), (0.0, -1.0)),
+        pytest.param("plane-strain", (40.0, 0.0), (1.0, 0.0), marks=pytest.mark.thorough),
+    ],
+)
 def test_each_halving_adds_as_much_as_flamant_says(space, at, along):
     block = Block(at=at, along=along)
     added = np.diff(block.displacements([2.5, 1.25, 0.625], space=space))
@@ -80,10 +85,9 @@ def test_displacements_in_space_grow_with_one_over_the_size():
 )
 def test_displacements_of_regions_converge(region, at, along):
     block = Block(region=region, at=at, along=along)
-    added = np.abs(np.diff(block.displacements([5.0, 2.5, 1.25, 0.625], space="plane-stress")))
+    added = np.abs(np.diff(block.displacements([5.0, 2.5, 1.25], space="plane-stress")))
     assert block.curve(size=5.0, space="plane-stress").growth_by_halving[0] == 0.0
-    rate = 0.5 * np.log2(added[0] / added[2])
-    assert rate >= 1.0
+    assert np.log2(added[0] / added[1]) >= 1.0
 
 
 def test_explanations_and_estimates_name_the_cause(caplog):

@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from fenicsmech.meshing import boundary_loops, cell_measures, gmsh, gmsh_session
 from ..meshing.bent_links import CURVED, DEPTH, LENGTH, RADIUS, STRAIGHT, THICKNESS, bent, bent_point, link
 
 PART = Path(__file__).parents[2] / "meshes" / "curved_link.step"
+PART_DEPTH = 10.0
 PINS = (PinHole(CURVED[0], RADIUS), PinHole(CURVED[-1], RADIUS))
 BENT_PINS = (PinHole(bent_point(0.0), RADIUS), PinHole(bent_point(LENGTH), RADIUS))
 
@@ -25,17 +27,31 @@ LINKS = {
     "part with holes": (lambda size, dim: mesh_link("part", step_file(PART, depth=DEPTH), dim=2, size=size), ()),
 }
 each_link = pytest.mark.parametrize("name", LINKS)
-each_dim = pytest.mark.parametrize("dim", [2, 3])
+# the part is meshed in the plane alone
+each_mesh = pytest.mark.parametrize(
+    ("name", "dim"), [("curved", 2), ("curved", 3), ("bent", 2), ("bent", 3), ("part with holes", 2)]
+)
+
+
+@cache
+def part_in_space():
+    """A mesh without layers."""
+    return mesh_link("part", step_file(PART, depth=PART_DEPTH), dim=3, size=3.0)
 
 
 def measures(path):
     """Volume, lowest and highest corner of the one solid in a STEP file."""
-    mesh = mesh_link("again", step_file(path, depth=DEPTH), dim=3, size=0.8)
+    points = []
     with gmsh_session("again"):
         entities = gmsh.model.occ.importShapes(str(path), highestDimOnly=False)
+        gmsh.model.occ.synchronize()
         assert [dim for dim, _ in entities].count(3) == 1
         volume = gmsh.model.occ.getMass(*next(entity for entity in entities if entity[0] == 3))
-    return volume, mesh.points.min(axis=0), mesh.points.max(axis=0)
+        for _, curve in gmsh.model.getEntities(1):
+            (first,), (last,) = gmsh.model.getParametrizationBounds(1, curve)
+            points.append(np.reshape(gmsh.model.getValue(1, curve, np.linspace(first, last, 200)), (-1, 3)))
+    points = np.concatenate(points)
+    return volume, points.min(axis=0), points.max(axis=0)
 
 
 def facets_of(path):
@@ -56,8 +72,7 @@ def holes_area(pins):
 
 
 @pytest.mark.thorough
-@each_dim
-@each_link
+@each_mesh
 def test_the_solid_has_the_volume_and_the_extent_of_a_fine_mesh(name, dim, tmp_path):
     make, _ = LINKS[name]
     mesh = make(0.5, dim)
@@ -71,10 +86,19 @@ def test_the_solid_has_the_volume_and_the_extent_of_a_fine_mesh(name, dim, tmp_p
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize(("name", "dim"), [("curved", 3), ("bent", 3), ("part with holes", 2)])
+def test_the_solid_is_meshed_as_a_link(name, dim, tmp_path):
+    write_step(tmp_path / "link.step", LINKS[name][0](1.5, 2), depth=DEPTH)
+    mesh = mesh_link("again", step_file(tmp_path / "link.step", depth=DEPTH), dim=dim, size=2.0)
+    _, low, high = measures(tmp_path / "link.step")
+    low, extent = low[:dim], (high - low)[:dim]
+    assert mesh.points.min(axis=0) == pytest.approx(low, abs=3e-3 * extent.max())
+    assert np.ptp(mesh.points, axis=0) == pytest.approx(extent, rel=3e-3)
+
+
+@pytest.mark.thorough
 def test_a_solid_of_a_mesh_without_layers_is_the_one_that_was_meshed(tmp_path):
-    depth = 10.0  # that of the part
-    mesh = mesh_link("part", step_file(PART, depth=depth), dim=3, size=1.5)
-    write_step(tmp_path / "link.step", mesh, depth=depth)
+    write_step(tmp_path / "link.step", part_in_space(), depth=PART_DEPTH)
     (volume, *extent), (expected, *drawn) = measures(tmp_path / "link.step"), measures(PART)
     assert volume == pytest.approx(expected, rel=3e-3)
     assert extent[1] - extent[0] == pytest.approx(drawn[1] - drawn[0], rel=3e-3)
@@ -116,8 +140,7 @@ def test_pins_leave_holes(name, tmp_path):
     assert whole - drilled == pytest.approx(DEPTH * (holes_area(pins) - there), rel=1e-2)
 
 
-@each_dim
-@each_link
+@each_mesh
 def test_the_surface_is_closed_and_looks_outward(name, dim, tmp_path):
     make, pins = LINKS[name]
     mesh = make(0.6, dim)
@@ -203,7 +226,7 @@ def crossing():
 
 def narrowing():
     """A solid that narrows upwards."""
-    mesh = mesh_link("part", step_file(PART, depth=DEPTH), dim=3, size=3.0)
+    mesh = part_in_space()
     x, y, z = mesh.points.T
     return replace(mesh, points=np.column_stack([x * (1.0 - 0.02 * z), y, z]))
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 import fenicsmech as fm
 
 from ..mechanism.truss_finger import truss_finger
-from .case import Check, Deviation, Fact, HardCase, deviation
+from .case import PLANE, Check, Deviation, Fact, HardCase, deviation
 
 SOFT = fm.Material("silicone", 1.9, 0.45)
 
@@ -19,7 +19,8 @@ def truss(space: str, comm: MPI.Comm) -> tuple[fm.Simulation, fm.mechanism.Force
     """Silicone diagonal in a rigid parallelogram: soft while it unbends, stiff once it is straight."""
     made = truss_finger(fm.strip([(0, 0), (18, 34), (40, 60)], thickness=6.0, depth=20.0), SOFT)
     push = made.push()
-    return fm.Simulation(fm.Scene(made.mechanism), space=space, order=1, size=5.0, comm=comm), push
+    size = 5.0 if space == PLANE else 10.0
+    return fm.Simulation(fm.Scene(made.mechanism), space=space, order=1, size=size, comm=comm), push
 
 
 def _at_once(space: str, comm: MPI.Comm) -> Iterator[Check]:

@@ -31,7 +31,7 @@ def _stretched_block(space: str, comm: MPI.Comm) -> Iterator[Check]:
     """Pulled along its first axes, free along the others; rounding of J counts 1/(1 − 2ν) times in the pressure."""
     model = {STRAIN: PLANE_STRAIN, SPACE: SPATIAL}[space]
     dim = model.dim
-    for poisson in RUBBERS:
+    for poisson in (RUBBERS[0], RUBBERS[-1]):
         for own, how in ((False, "displacements alone"), (True, "with a pressure")):
             young = _young(poisson)
             block = single_link(*distorted(dim), model=model, young=young, poisson=poisson, mixed=own, comm=comm)
@@ -72,9 +72,9 @@ def _bent_strip(space: str, comm: MPI.Comm) -> Iterator[Check]:
     """
     clamp = 3.0 * 0.25 * THICKNESS / LENGTH
     lost = {}
-    for formulation in (ALONE, PRESSED):
+    for formulation, rubbers in ((ALONE, RUBBERS[1::2]), (PRESSED, RUBBERS)):
         tips = []
-        for poisson in RUBBERS:
+        for poisson in rubbers:
             section = beam.Section.rectangle(
                 young=_young(poisson),
                 poisson=poisson,
@@ -87,7 +87,7 @@ def _bent_strip(space: str, comm: MPI.Comm) -> Iterator[Check]:
             wanted = beam.solve(line, beam.CLAMPED, beam.End(force_y=force)).end.displacement[1]
             simulation, push, _ = strip(space, comm, poisson=poisson, size=THICKNESS, formulation=formulation)
             tips.append(simulation.load_displacement(push, forces=[force]).displacements[0] / wanted)
-        lost[formulation] = abs(tips[1] - tips[-1])
+        lost[formulation] = abs(tips[rubbers.index(0.49)] - tips[-1])
         if formulation is PRESSED:
             yield deviation("with a pressure: tip against the beam", tips, 1.0, clamp)
             yield deviation("change from ν = 0.49 to 0.4999", tips[1:], tips[1], 0.04 * clamp)

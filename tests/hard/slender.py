@@ -134,7 +134,7 @@ def _contrast(space: str, comm: MPI.Comm) -> Iterator[Check]:
         outputs[name] = mechanism.output(on=carriage, at=(end, 0), direction=(0, 1))
         before, start = carriage, end + 10.0
     push = mechanism.force(on=before, at=(start, 0), direction=(0, 1))
-    simulation = fm.Simulation(fm.Scene(mechanism), space=space, size=thickness, comm=comm)
+    simulation = fm.Simulation(fm.Scene(mechanism), space=space, size=CELL[space][30] * thickness, comm=comm)
     bending = section(thickness, depth=depth, poisson=poisson, young=CONTRAST["silicone"]).bending
     force = 12.0 * bending / length**3 * 3.0  # the softest moves by a tenth of its length, were it linear
     frame = simulation.load_displacement(push, forces=[force]).frames[0]

@@ -30,17 +30,28 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
 import fenicsmech as fm
-from fenicsmech.live import Server, ServerOptions, example, project_of
+from fenicsmech.live import Server, ServerOptions, edited, example, project_of
 
 pytestmark = pytest.mark.slow
 PICTURES = Path(__file__).parents[2] / "results" / "live"
 LONGEST = 200.0  # s, of one solve on a machine that does other things as well
 
 
+def with_few_frames(name, steps):
+    """An example whose curves have few frames."""
+    project = example(name)
+    curves = range(len(project["curves"]))
+    return edited(project, [{"kind": "set", "path": ["curves", k, "steps"], "value": steps} for k in curves])
+
+
+FINGER = with_few_frames("truss-finger", 4)
+MOTOR = with_few_frames("four-bar-with-a-motor", 2) | {"fit": False}
+
+
 @contextmanager
 def serving():
     """A server in a thread of its own."""
-    loop, server = asyncio.new_event_loop(), Server(example("truss-finger"), ServerOptions(stored=None))
+    loop, server = asyncio.new_event_loop(), Server(FINGER, ServerOptions(stored=None))
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
     asyncio.run_coroutine_threadsafe(server.start(), loop).result(60)
@@ -69,6 +80,7 @@ def chrome():
         "--hide-scrollbars",
         "--use-angle=swiftshader",
         "--enable-unsafe-swiftshader",
+        "--force-prefers-reduced-motion",  # without a graphics card, an animation takes a processor from the solver
     ):
         options.add_argument(option)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
@@ -184,7 +196,7 @@ def test_a_control_point_that_is_dragged_bends_the_link_and_its_curve(page):
         previewed.append(page.run(f"return {shape}"))
         page.until("live.store.linear !== first")  # it is solved where the hand rests
 
-    page.drag(page.chrome.find_elements(By.CSS_SELECTOR, ".handle.control")[0], 12, 8, during=during)
+    page.drag(page.chrome.find_elements(By.CSS_SELECTOR, ".handle.control")[0], 12, 8, steps=4, during=during)
     page.until("!document.querySelector('.handle.held') && document.body.dataset.solver === 'idle'")
     assert previewed == [2]
     change = np.subtract(page.run("return live.store.project.design.offsets"), before)
@@ -198,7 +210,7 @@ def test_a_control_point_that_is_dragged_bends_the_link_and_its_curve(page):
 def test_a_joint_that_is_dragged_changes_the_mechanism_and_its_design_follows(page):
     choose(page, "shape")
     page.until("document.querySelectorAll('.handle.joint').length === 4")
-    page.drag(page.chrome.find_elements(By.CSS_SELECTOR, ".handle.joint")[2], -30, -20)
+    page.drag(page.chrome.find_elements(By.CSS_SELECTOR, ".handle.joint")[2], -30, -20, steps=10)
     page.until("live.store.project.joints[2].at[0] < -1")
     page.until("document.body.dataset.solver === 'idle'")
     page.settled()
@@ -329,7 +341,7 @@ def test_nothing_moves_when_something_is_told_or_while_it_is_solved(page, width)
 
 
 def test_the_preview_of_a_push_at_a_point_leads_where_the_solve_does(page):
-    page.run("document.getElementById('play').click(); live.store.load = 0.5; live.store.show()")
+    page.run("live.store.load = 0.5; live.store.show()")
     view = page.chrome.find_element(By.ID, "view")
     x, y = page.run("""
         const { view, store } = live, tip = store.drawnMesh().rigid.findIndex((own) => own.name === "tip");
@@ -357,7 +369,16 @@ def test_the_preview_of_a_push_at_a_point_leads_where_the_solve_does(page):
     assert np.abs(missed).max() < 0.1 * np.abs(wanted - before).max()
     ActionChains(page.chrome).release().perform()
     page.until("!live.store.pushed && !live.store.leaning")
-    page.run("document.getElementById('play').click()")
+
+
+def test_the_mechanism_moves_while_it_is_played(page):
+    play = page.chrome.find_element(By.ID, "play")
+    assert play.get_attribute("aria-pressed") == "false"  # for somebody who prefers reduced motion
+    play.click()
+    page.until("live.store.load > 0.1", 20)
+    play.click()
+    after = "return new Promise((go) => setTimeout(() => go(live.store.load), 200))"
+    assert page.run("return live.store.load") == page.run(after)
 
 
 def test_a_push_beyond_the_curve_is_solved(page):
@@ -435,7 +456,6 @@ def test_keys_move_add_and_remove_targets_joints_and_pushes(page):
     page.until("live.store.project.targets[1].displacement === 9")
     page.settled()
     page.run("document.getElementById('view').focus()")
-    page.run("document.getElementById('play').click()")
     page.chrome.switch_to.active_element.send_keys(Keys.ARROW_RIGHT * 3)
     page.until("live.store.pushing && live.handles.pushed.force > 0.05")
     page.chrome.switch_to.active_element.send_keys(Keys.ESCAPE)
@@ -596,6 +616,11 @@ def test_the_button_for_curves_rests_at_the_last_that_the_page_adds(page):
     choose(page, "move")
 
 
+def open_project(page, project):
+    """Opens another project."""
+    page.chrome.execute_script("live.send({kind: 'open', project: arguments[0]})", project)
+
+
 def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
     switch = import_module("demos.switch")
     described = switch.describe()
@@ -604,7 +629,7 @@ def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
     (link,) = described[0].mechanism.flexible_links
     wanted["targets"].append(fm.Target(fm.LinkVolume(link), at_most=2000.0))
     project = project_of(fm.DesignProblem(sim, **wanted)) | {"fit": False}
-    page.chrome.execute_script("live.send({kind: 'open', project: arguments[0]})", project)
+    open_project(page, project)
     page.until("live.store.project.name === 'switch' && live.store.required.length === 1")
     listed = [item.text for item in page.chrome.find_elements(By.CSS_SELECTOR, "#carried li")]
     assert len(listed) == 2 and "reached" in listed[0] and "spring" in listed[1]
@@ -626,7 +651,7 @@ def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
         {"curve": 0, "displacement": 5.4, "force": 1.2, "weight": 10.0}, rel=0.05
     )
     assert previewed == [1]
-    page.run("live.send({kind: 'example', name: 'truss-finger'})")
+    open_project(page, FINGER)
     page.until("live.store.project.name === 'truss finger' && !document.querySelector('#carried li')")
     page.settled()
 
@@ -634,12 +659,11 @@ def test_a_problem_of_a_script_is_shown_with_what_it_requires(page):
 @pytest.fixture
 def motor_page(page):
     """The page with a motor's project, solved; the next test finds the finger again."""
-    opened = "live.send({{kind: 'example', name: '{}'}})"
-    page.run(opened.format("four-bar-with-a-motor"))
+    open_project(page, MOTOR)
     page.until("live.store.project.motors.length && document.querySelector('#side input[type=range]')")
     page.settled()
     yield page
-    page.run(opened.format("truss-finger"))
+    open_project(page, FINGER)
     page.until("live.store.project.name === 'truss finger'")
     page.settled()
 

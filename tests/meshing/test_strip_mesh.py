@@ -53,9 +53,13 @@ def test_eyes_add_the_part_of_their_disc_beyond_the_strip(ratio):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("half", [None, False, True])
-@pytest.mark.parametrize("thickness", [2.5, 1.0, 0.3])
-@pytest.mark.parametrize("points", [STRAIGHT, BENT, WAVY])
+@pytest.mark.parametrize(
+    ("half", "thickness", "points"),
+    [
+        *((None, thickness, points) for thickness in (2.5, 1.0, 0.3) for points in (STRAIGHT, BENT, WAVY)),
+        *((half, thickness, BENT) for half in (False, True) for thickness in (2.5, 0.3)),
+    ],
+)
 def test_eyes_much_wider_than_the_strip_are_discs_around_their_pins(points, thickness, half):
     radius, size, depth = 3.0, 0.6, 2.0
     sites = pins(points[0], on_curve(points, 0.5), points[-1], radius=radius)
@@ -82,7 +86,7 @@ def test_pins_no_wider_than_the_strip_round_its_ends(ratio):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("size", [0.6, 1.5, 3.0])
+@pytest.mark.parametrize("size", [0.6, 3.0])
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("points", [STRAIGHT, BENT, WAVY])
 def test_pins_of_any_width_at_the_ends_and_along_the_way_give_well_shaped_cells(points, ratio, size):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 import pytest
@@ -37,37 +38,33 @@ NUMBERS = {
     ),
     "rest": (lambda bench: fm.SpringRest(*bench.simulation.scene.effects), (0.1, 0.05, 0.025)),
     "offset": (lambda bench: fm.MotorOffset(*bench.simulation.scene.mechanism.motors), (0.04, 0.02, 0.01, 0.005)),
+    "axis": (lambda bench: fm.JointAxis(joints(bench)[3], about=(1, 0.4, 0)), (0.04, 0.02, 0.01, 0.005)),
 }
-QUICK = ("modulus", "depth", "stiffness", "offset")
-CASES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
+TURNED = 0.2  # of the hinge whose axis is changed, already
+SPACES = ("plane-stress", "plane-stress moved", "plane-strain pressure", "3d-symmetric", "3d moved", "3d pressure")
+SHARED = ("plane-stress", "plane-strain pressure", "3d-symmetric")  # where numbers of two parts are tested too
+MARKS = {"plane-stress": pytest.mark.parallel, "plane-stress moved": ()}  # else thorough
 
 
-@pytest.fixture(
-    scope="module",
-    params=[
-        pytest.param(space, marks=pytest.mark.parallel if space == "plane-stress" else pytest.mark.thorough)
-        for space in CASES
-    ],
-)
-def bench(request) -> Bench:
-    space, *more = request.param.split()
+@cache
+def made(case: str) -> Bench:
+    space, *more = case.split()
     formulation = fm.MixedFormulation(above=0.3) if "pressure" in more else None
     return Bench(space, MPI.COMM_WORLD, formulation, moved="moved" in more, springs=True)
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.thorough) for name in NUMBERS]
+    ("space", "name"),
+    [
+        pytest.param(space, name, marks=MARKS.get(space, pytest.mark.thorough))
+        for space in SPACES
+        for name in NUMBERS
+        if (space in SHARED or "both" not in name) and ("3d " in space or name != "axis")
+    ],
 )
-def test_derivatives_by_a_number(bench, name):
-    describe, steps = NUMBERS[name]
-    assert_derivatives(bench, describe(bench), steps)
-
-
-def test_derivatives_by_the_axis_of_a_hinge_that_is_turned_already(bench):
-    if bench.model.linkage.dim == 2:
-        pytest.skip("axes of hinges do not turn in the plane")
-    hinge = joints(bench)[3]
-    assert_derivatives(bench, fm.JointAxis(hinge, about=(1, 0.4, 0)), (0.04, 0.02, 0.01, 0.005), start=0.2)
+def test_derivatives_by_a_number(space, name):
+    bench, (describe, steps) = made(space), NUMBERS[name]
+    assert_derivatives(bench, describe(bench), steps, start=TURNED if name == "axis" else None)
 
 
 def assert_derivatives(bench: Bench, kind: fm.NumberKind, steps: Sequence[float], start: float | None = None) -> None:

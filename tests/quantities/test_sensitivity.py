@@ -88,26 +88,25 @@ class Bench:
         """The control."""
         return DisplacementControl(PLACE + self.origin + change) if self.moved else LoadControl(FORCE + change)
 
-    def state(self, design: np.ndarray, change: float = 0.0) -> State:
-        """The equilibrium of the given design."""
+    def state(self, design: fm.Design | np.ndarray) -> State:
+        """The equilibrium of the given design from zero load, near which those of ``values`` are found."""
         self.model.reshape(design)
-        curve = self.simulation.load_displacement(self.force, forces=[0.0], configuration=self.turned)
+        samples = {"displacements": [PLACE]} if self.moved else {"forces": [FORCE]}
+        curve = self.simulation.load_displacement(self.force, configuration=self.turned, **samples)
         self.model.load(curve.unloaded)
-        unloaded = self.model.travel(self.force, curve.unloaded)
-        if not hasattr(self, "origin"):
-            self.origin = unloaded
-        # curves count displacements from the unloaded configuration of each design
-        value = PLACE + self.origin - unloaded + change if self.moved else FORCE + change
-        samples = {"displacements" if self.moved else "forces": [value / 2, value]}
-        return self.simulation.load_displacement(self.force, configuration=self.turned, **samples).frames[-1].state
+        self.origin = self.model.travel(self.force, curve.unloaded)
+        self.known, self.design = curve.frames[-1].state, self.model.design
+        return self.known
 
-    def values(self, design: np.ndarray, change: float = 0.0) -> np.ndarray:
-        """All components of all quantities."""
-        state = self.state(design, change)
+    def values(self, design: fm.Design | np.ndarray, change: float = 0.0) -> np.ndarray:
+        """All components of all quantities at the equilibrium near the last ``state``."""
+        self.model.reshape(self.design)
+        near = self.model.carry(self.known, design)
+        state = self.solver.solve(near, self.control(change)).state
         self.model.load(state)
         return np.concatenate([own.values(state) for own in self.observables])
 
-    def gradients(self, design: np.ndarray) -> list[Gradient]:
+    def gradients(self, design: fm.Design | np.ndarray) -> list[Gradient]:
         """The derivatives of all components."""
         state = self.state(design)
         return self.adjoint.gradients(self.solver, state, self.control(), self.observables)

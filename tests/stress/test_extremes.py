@@ -122,7 +122,6 @@ def test_what_materials_lack_is_named():
         (fm.LargestStress(), {"at_most": 4.0}),
         (fm.LargestStrain(), {"at_most": 4e-4}),
         (fm.LeastSafety(), {"at_least": 2.5}),
-        (fm.LeastLife(), {"at_least": 16.3}),
     ],
     ids=lambda own: "" if isinstance(own, dict) else type(own).__name__,
 )

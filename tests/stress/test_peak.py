@@ -12,6 +12,9 @@ from ..simulation.clamped import YOUNG, cantilever
 
 COMMS = (MPI.COMM_SELF, MPI.COMM_WORLD)
 STEEL = fm.Material("steel", 1e6, 0.3)
+# one each of a clamp, a hole, a re-entrant side and a pressed bore
+KINDS = ("cantilever", "plate with a hole", "U notch", "Lamé's tube")
+IN_SPACE = [case for case in CASES if case.name in KINDS]
 
 
 def bent_bar(size: float, *, angle: float = 0.0, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[fm.Simulation, fm.Frame]:
@@ -69,7 +72,7 @@ def test_peaks_are_those_of_closed_forms_or_fine_elements(case, share):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", IN_SPACE, ids=lambda case: case.name)
 def test_peaks_in_space_are_those_of_closed_forms_or_fine_elements(case):
     frame, known = case.solved("3d-symmetric", case.size)
     assert frame.peak.value == pytest.approx(known.value, rel=0.03)

@@ -78,8 +78,6 @@ CASES = [
     pytest.param("3d-symmetric", 1, FLOOR, {}, id="contact of half a link"),
     pytest.param("3d-symmetric", 2, SOFT, {"poisson": 0.497}, id="compliance beside half a link in u–p form"),
     pytest.param("3d", 1, WEIGHT, {}, id="weight in space"),
-    pytest.param("3d", 1, SWELLING, {}, id="swelling in space"),
-    pytest.param("3d", 1, FLOOR, {}, id="contact in space"),
 ]
 
 

@@ -267,15 +267,17 @@ def test_joints_are_not_opened_for_a_displacement_out_of_reach(scene, reason):
 
 @pytest.mark.thorough
 def test_a_force_a_hundred_times_beyond_its_limit_snaps_to_an_equilibrium():
-    assert judge_sound(LIMIT_OF_A_LED_FORCE).outcome == "equilibrium"
-    assert build(LIMIT_OF_A_LED_FORCE).curve(LIMIT_OF_A_LED_FORCE).snapped_through.all()
+    scene, built = LIMIT_OF_A_LED_FORCE, build(LIMIT_OF_A_LED_FORCE)
+    curve = built.curve(scene)
+    assert judge_frames(scene, built, curve.frames, ended=True).outcome == "equilibrium"
+    assert curve.snapped_through.all()
 
 
 @pytest.mark.slow
 def test_constant_loads_far_beyond_a_limit_point_end_in_the_stable_equilibrium_past_the_turns_of_their_path():
-    scene = LIMIT_OF_A_CONSTANT_FORCE
-    assert judge_sound(scene).outcome.startswith("equilibrium")
-    (frame,) = build(scene).curve(scene).frames
+    scene, built = LIMIT_OF_A_CONSTANT_FORCE, build(LIMIT_OF_A_CONSTANT_FORCE)
+    (frame,) = built.curve(scene).frames
+    assert judge_frames(scene, built, [frame], ended=True).outcome.startswith("equilibrium")
     assert frame.snapped_through and frame.stable
 
 
@@ -284,7 +286,7 @@ def test_springs_hardly_stiffer_than_the_rounding_of_links_hold_whatever_the_las
     # where rounding makes the inertia doubtful, shifted steps creep, which is no sign of convergence
     (spring,), rng = SOFT_SPRING.effects, np.random.default_rng(0)
     reached = []
-    for load, stiffness in 1.0 + 1e-3 * rng.standard_normal((5, 2)):
+    for load, stiffness in 1.0 + 1e-3 * rng.standard_normal((3, 2)):
         samples = tuple(load * sample for sample in SOFT_SPRING.samples)
         effects = (replace(spring, stiffness=stiffness * spring.stiffness),)
         scene = replace(SOFT_SPRING, samples=samples, effects=effects)
