@@ -178,4 +178,7 @@ def test_a_parameter_alone_has_the_interval_of_the_modulus():
     alone, modulus = fm.fit_parameters(bent, {GUESS: ["E"]}), fit_modulus(bent, GUESS)
     assert alone.values[GUESS]["E"] == pytest.approx(modulus.youngs_modulus, rel=1e-5)
     assert alone.standard_errors[GUESS]["E"] == pytest.approx(modulus.standard_error, rel=1e-4)
+    E = alone.values[GUESS]["E"]
+    reach = np.array(alone.intervals[GUESS]["E"]) / E - 1.0  # of ln E where the modulus alone is fitted
+    assert modulus.interval == pytest.approx(E * np.exp(reach), rel=1e-5)
     assert alone.materials[GUESS].law.E == alone.values[GUESS]["E"]
