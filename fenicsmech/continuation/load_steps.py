@@ -371,9 +371,11 @@ class LoadStepper(Stepper):
     def _scale(self, distance: float) -> float:
         """Reference length of steps: the distance covered so far, at first the first step, whatever the end.
 
-        So a prescribed load a thousand times the limit load locates it as closely as one just beyond it.
+        So a prescribed load a thousand times the limit load locates it as closely as one just beyond it. To a value
+        that is the first one but for rounding nothing is covered: no step is as small.
         """
-        return min(abs(distance), self._covered or abs(self._limited(distance, distance)))
+        covered = self._covered if self._covered > 0.5**self._steps.failures * abs(distance) else 0.0
+        return min(abs(distance), covered or abs(self._limited(distance, distance)))
 
     def _snapped(self, point: EquilibriumPoint) -> bool:
         """Whether the rate of the step to ``point`` lies outside the range of the tangents at its ends.
