@@ -124,15 +124,12 @@ def unstrained_work(
 
 
 def _held(potential: Potential, plan: EffectPlan, places: list[Place]) -> float:
-    """The force of a spring, turned by the mechanism's length, of a joint that gives way, or the weight.
-
-    A spring's is that of its turn and that of its rest position, which cancel where it comes to rest.
-    """
+    """The force of a spring, turned by the mechanism's length, of a joint that gives way, or the weight."""
     match plan:
         case SpringPlan(joint=name, stiffness=stiffness, rest=rest):
             joint = potential.blueprint.joint(name)
-            turn = abs(potential.closure.coordinate(joint, places).real) + abs(potential.load_factor * rest)
-            return float(stiffness * turn) / (1.0 if joint.kind == "prismatic" else potential.blueprint.length)
+            turn = potential.closure.coordinate(joint, places).real - potential.load_factor * rest
+            return float(abs(stiffness * turn)) / (1.0 if joint.kind == "prismatic" else potential.blueprint.length)
         case CompliancePlan(joint=name, compliance=compliance):
             gap = potential.closure.gap(potential.blueprint.joint(name), places).real
             return float(np.sqrt(np.sum(gap**2))) / compliance
