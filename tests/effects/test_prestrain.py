@@ -86,7 +86,7 @@ def test_residuals_of_displacement_and_pressure_are_differentiated_by_the_load_f
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric"])
 def test_a_bar_that_swells_in_all_directions_grows_as_long_as_it_would(space):
     # its ends are held across: away from them it is free
     simulation, push = bar(space, 1.1, along=None)
@@ -106,8 +106,10 @@ def test_a_held_bar_pushes_by_its_stiffness_times_the_strain_it_may_not_have(spa
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("along", [(0.8, 0.6), None])
-@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize(
+    ("space", "along"),
+    [("plane-stress", (0.8, 0.6)), ("plane-stress", None), ("plane-strain", None), ("3d", (0.8, 0.6))],
+)
 def test_energy_and_its_gradient_are_differentiated(space, along):
     simulation, _ = bar(space, 1.2, along=along)
     body, dim = simulation.model.elastic, simulation.linkage.dim
@@ -134,7 +136,7 @@ def test_energy_and_its_gradient_are_differentiated(space, along):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d"])
 def test_displacements_are_differentiated_by_the_design_field(space):
     simulation, push = bar(space, 1.1, held=True, bow=4.0)
     assert_design_gradient(simulation, push, 1.0)

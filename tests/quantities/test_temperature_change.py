@@ -22,7 +22,7 @@ def effects(mechanism: fm.Mechanism) -> Sequence[fm.Effect]:
     scope="module",
     params=[
         pytest.param("plane-stress", marks=pytest.mark.parallel),
-        *(pytest.param(own, marks=pytest.mark.thorough) for own in ("plane-strain", "3d-symmetric")),
+        pytest.param("plane-strain", marks=pytest.mark.thorough),
     ],
 )
 def bench(request) -> Bench:
