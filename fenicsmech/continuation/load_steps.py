@@ -21,7 +21,9 @@ the same on all processes and machines, and not by time:
     5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
     6. steps that turn links (``equilibrium.turning``), 1 to   as these; the kind that led to the last equilibrium
        5, or those that do not                                 comes first
-    7. half the step                                           ``LoadSteps.smallest``, or ``failures`` in a row
+    7. half the step                                           ``LoadSteps.smallest``, ``smallest_snap_step`` once an
+                                                               equilibrium past a fold is known, or ``failures`` in
+                                                               a row
     8. the nearest equilibrium found past a fold, a snap       one
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre                                    not; then load steps once more
@@ -93,7 +95,8 @@ class LoadSteps:
             that of kinks is smaller.
         branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
         smallest_snap: smallest motion that counts as a snap; that at bifurcations is smaller.
-        smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap.
+        smallest_snap_step: smallest step, measured like ``smallest``, that is halved because of a snap, or where the
+            equilibrium beyond one is known.
         fold_growth: growth of the tangent over the last step from which the path counts as turning back.
         fold_ahead: largest distance ahead at which it does, over the last step that failed.
         minimum_shift: least shift of the KKT matrix, in units of links' stiffness, where a mechanism has zero-energy
@@ -241,7 +244,8 @@ class LoadStepper(Stepper):
                 tried.append(value)
                 failed, halved = failed + 1, True
                 step = 0.5 * (value - self._value)
-                if abs(step) > steps.smallest * self._scale(distance) and failed < steps.failures:
+                smallest = steps.smallest if beyond is None else steps.smallest_snap_step
+                if abs(step) > smallest * self._scale(distance) and failed < steps.failures:
                     continue
                 if beyond is None:
                     fold = self._fold(tried[-1])

@@ -149,19 +149,22 @@ def correct(
     first: Round,
     options: Correction,
     *,
+    origin: np.ndarray,
     minimise: Callable[[Start, Round], tuple[Optimum, Round]],
     truth: Callable[[Optimum], Reached],
     continued: Callable[[np.ndarray], np.ndarray | None],
 ) -> Corrected:
     """Rounds of minimisation and correction, until corrections have settled, do not contract, or iterations run out.
 
-    Where a later round has no value, the outcome is that of the one before.
+    Where a later round has no value, the outcome is that of the one before. Where it ends with violated inequalities,
+    which the design of the round before met as they were then, it is repeated from the run's start.
 
     Args:
         objective: the one that is minimised.
         begin: where the first round starts.
         first: the first round.
         options: of the correction.
+        origin: where the run starts, which later rounds may do again.
         minimise: the optimum of one round, and that round with the values at its start.
         truth: values of the simulation that counts.
         continued: the optimiser's memory at the start of the next round, from that at the end of the last.
@@ -174,6 +177,9 @@ def correct(
     while True:
         try:
             optimum, round = minimise(begin, round)
+            if optimum.reason is Reason.VIOLATED and last is not None:
+                again = Start(origin, optimum.number, optimum.evaluations)
+                optimum, round = minimise(again, round)
             reached = truth(optimum)
         except Infeasible as failure:
             if last is None:
@@ -354,6 +360,7 @@ class CorrectedRun:
             begin,
             first,
             self._options,
+            origin=low.rest.initial if self._start is None else low.given(self._start)[0],
             minimise=lambda begin, round: self._minimise(low, begin, round),
             truth=lambda optimum: self._comm.bcast(truth(optimum), root=0),
             continued=self._optimiser.continued,
