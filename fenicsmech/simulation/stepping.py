@@ -350,7 +350,7 @@ class CurveStepper:
             with self.keeping_frames():
                 state = stepper.advance(control.at(1.0)).state
         except LoadStepsFailed as failure:
-            if (found := self._settled(control)) is not None:
+            if (found := self._settled(control)) is not None and not found.unstable:
                 _log.warning(
                     "%s: steps of constant loads end early; curves start where these and springs balance",
                     self.request.where,
@@ -422,7 +422,7 @@ class CurveStepper:
         Constant loads that are not far weaker than springs swing a mechanism far, past folds where it snaps. Where
         springs are softer than the rounding of what loads the links, each load step comes to rest elsewhere.
         """
-        if not (self.adrift or self._springs_below_rounding) or (pose := self._rest_poses.balanced()) is None:
+        if (pose := self._rest_poses.balanced()) is None:
             return None
         all_loads = control.at(1.0)
         start = replace(all_loads.prepare(pose), minimum_shift=LoadSteps().minimum_shift)

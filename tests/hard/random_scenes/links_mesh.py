@@ -20,6 +20,7 @@ import fenicsmech as fm
 from .strain_energy import REAL
 
 _CORRECTIONS = 30  # of a point's place in a curved cell
+_ARRIVED = 1e-6  # largest last correction, in barycentric coordinates, of a place that was found
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,8 @@ class LinksMesh:
         return int(cells[best]), inside[best]
 
     def _inside(self, cells: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Barycentric coordinates of a point in each of ``cells``, by Newton's method from its middle, (m, dim + 1)."""
+        """Barycentric coordinates of a point in each of ``cells``, by Newton's method from its middle, (m, dim + 1);
+        −∞ where it does not get to the point, as in curved cells far off."""
         inside, nodes = np.full((len(cells), self.dim + 1), 1.0 / (self.dim + 1)), self.nodes[self.cells[cells]]
         for _ in range(_CORRECTIONS):
             slopes = self.elements.slopes(inside).astype(float)
@@ -157,6 +159,7 @@ class LinksMesh:
             change = np.linalg.solve(np.swapaxes(edges, 1, 2), gap[..., None])[..., 0]
             change /= np.maximum(1.0, np.abs(change).max(axis=1, keepdims=True))
             inside += np.column_stack([-change.sum(axis=1), change])
+        inside[np.abs(change).max(axis=1) > _ARRIVED] = -np.inf
         return inside
 
 

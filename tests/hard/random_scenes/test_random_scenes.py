@@ -127,6 +127,14 @@ def test_curves_that_leave_loads_out_are_wrong(solved):
     assert judge_frames(replace(more, control="path"), None, [], ended=True).outcome == "wrong: frames missing"
 
 
+def test_points_are_not_found_in_curved_cells_far_off():
+    scene = random_scene(23308)
+    mesh, at = Potential.of(scene, build(scene).simulation).mesh, np.array(scene.forces[0].at)
+    cell, inside = mesh.locate(np.arange(len(mesh.cells)), at)
+    there = mesh.elements.values(inside[None])[0] @ mesh.nodes[mesh.cells[cell]]
+    assert there == pytest.approx(at, abs=1e-9 * scene.length)
+
+
 def test_imaginary_differences_of_the_potential_are_real_ones(solved):
     potential, frame, _ = solved
     mesh, places = potential.mesh, potential.places(frame.state.poses)
