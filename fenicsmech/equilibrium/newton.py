@@ -423,7 +423,8 @@ class SpinningSolver(NewtonSolver):
     def _turned(self, state: State, control: Control) -> EquilibriumPoint:
         """The equilibrium found by turns between those with held spins."""
         system, options = self.system, self.options
-        residuals, iterations, before = list[float](), 0, math.inf
+        # along a path spins stay as they are while their moments may be rounding, as the next point is near
+        residuals, iterations, before = list[float](), 0, 0.0 if control.along_path else math.inf
         largest, last = options.largest_turn, None  # moments and length of the last turn
         for _ in range(options.turns):
             self._held = True
