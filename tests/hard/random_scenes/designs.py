@@ -16,6 +16,8 @@ import fenicsmech as fm
 from .blueprint import Blueprint, Built, build
 from .draw import bending_force, decade
 from .generator import planar_scene
+from .potential import Potential
+from .residual_check import energy_digits
 from .thresholds import THRESHOLDS
 
 UNMET = "designed: two starts meet no target"
@@ -199,7 +201,11 @@ def _misreported(
             raise
         return "designed: not verified, and not reached from rest", str(error)
     found, reported = _reached(scene, curve.frames[-1]), float(result.targets[0].reached)
-    grain = THRESHOLDS.reached * scene.blueprint.length if scene.goal == "displacement" else 0.0
-    if abs(found - reported) > grain + THRESHOLDS.energy * abs(found):
+    grain, size = 0.0, abs(found)
+    if scene.goal == "displacement":
+        grain = THRESHOLDS.reached * scene.blueprint.length
+    elif scene.goal == "strain energy":
+        size = max(size, energy_digits(Potential.of(scene.blueprint, simulation)))
+    if abs(found - reported) > grain + THRESHOLDS.energy * size:
         return f"wrong: {scene.goal} of a design", f"{reported:.9g} reported, {found:.9g} on a curve from rest"
     return None

@@ -166,17 +166,22 @@ def least_stretch(potential: Potential, u: np.ndarray, poses: np.ndarray, travel
         held = np.append(potential.closure.residual(places).astype(float), (way - wanted) / length)
         return np.concatenate([np.maximum(slack, 0.0), THRESHOLDS.tied * held])
 
-    def fitted(unknowns: np.ndarray, wanted: float) -> OptimizeResult:
-        return least_squares(residual, unknowns, args=(wanted,), xtol=1e-12, ftol=_TOLERANCE, max_nfev=_EVALUATIONS)
+    def fitted(unknowns: np.ndarray, wanted: float) -> OptimizeResult | None:
+        """None where a fit runs off beyond all numbers."""
+        options = {"xtol": 1e-12, "ftol": _TOLERANCE, "max_nfev": _EVALUATIONS}
+        try:
+            return least_squares(residual, unknowns, args=(wanted,), **options)
+        except ValueError:
+            return None
 
     unknowns = np.zeros(len(free) * (dim + turns) + len(loose) * dim)
     for share in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         fit = fitted(unknowns, known + share * (travel - known))
-        unknowns = fit.x
+        unknowns = unknowns if fit is None else fit.x
     starts = np.random.default_rng(0).uniform(-_APART, _APART, (_STARTS, unknowns.size))
-    fits = [fit, *(fitted(start, travel) for start in starts)]
+    fits = [own for own in (fit, *(fitted(start, travel) for start in starts)) if own is not None]
     stretches = 1.0 + np.sqrt([2.0 * fit.cost / max(len(strings), 1) for fit in fits])
-    least, converged = float(stretches.min()), stretches[[fit.success for fit in fits]]
+    least, converged = float(stretches.min(initial=np.inf)), stretches[[fit.success for fit in fits]]
     return least if converged.min(initial=np.inf) < least + _CLOSE else np.nan
 
 

@@ -92,7 +92,7 @@ def check(potential: Potential, frame: fm.Frame, origin: float, seed: int = 0) -
         scale=scale,
         floor=floor,
         travel_error=abs(travel - frame.displacement) / length,
-        energy_error=abs(energy - frame.strain_energy) / max(abs(frame.strain_energy), _energy_digits(potential)),
+        energy_error=abs(energy - frame.strain_energy) / max(abs(frame.strain_energy), energy_digits(potential)),
         unstrained_work=unstrained_work(potential, frame.force, followed, p, places, floor=floor, reaction=scale),
     )
 
@@ -180,7 +180,7 @@ def _floor(potential: Potential, u: np.ndarray, places: list[Place]) -> float:
     return float(np.sqrt(squares))
 
 
-def _energy_digits(potential: Potential) -> float:
+def energy_digits(potential: Potential) -> float:
     """Cancellation error of textbook energies: 1e-16 of the modulus, times the volume; all but the last ``digits``."""
     volume = sum(link.young / (1 - 2 * _poisson(potential, link)) for link in potential.blueprint.flexible)
     thickest = max(link.depth for link in potential.blueprint.flexible) if potential.mesh.dim == 2 else 1.0
