@@ -112,6 +112,27 @@ def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(p
     assert path.failed <= 0.5 * len(path.tried) + math.log2(1.0 / part)
 
 
+class Folded(Stubborn):
+    """A path y = p up to p = 0.1; from p = 0.2 on solves end far off, on another one, and in between nowhere."""
+
+    def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
+        between = 0.1 < control.prescribed < 0.2
+        self.reached, self.longest = control.prescribed, -1.0 if between else math.inf
+        point = super().solve(start, control)
+        far = 5.0 if control.prescribed >= 0.2 else 0.0
+        return replace(point, state=replace(point.state, u=point.state.u + far))
+
+
+def test_a_fold_beyond_which_an_equilibrium_is_known_is_approached_as_closely_as_others_and_no_closer():
+    path = Folded(math.inf)
+    walk = stepper(path)
+    walk.advance(LoadControl(0.1))
+    assert walk.advance(LoadControl(0.2)).state.force == 0.2
+    assert walk.snaps == 1
+    nearest = min(value - 0.1 for value, _ in path.tried if value > 0.1)
+    assert nearest == pytest.approx(0.1 * 2.0 * LoadSteps().smallest_snap_step, rel=0.6)
+
+
 @pytest.mark.parametrize("before", [1e-17, 1e-12, 1e-6, 1e-2])  # the first is one of rounding
 def test_steps_that_only_fail_end_after_a_bounded_number_with_the_last_equilibrium(before):
     path = Stubborn(math.inf)
