@@ -149,22 +149,19 @@ def correct(
     first: Round,
     options: Correction,
     *,
-    origin: np.ndarray,
     minimise: Callable[[Start, Round], tuple[Optimum, Round]],
     truth: Callable[[Optimum], Reached],
     continued: Callable[[np.ndarray], np.ndarray | None],
 ) -> Corrected:
     """Rounds of minimisation and correction, until corrections have settled, do not contract, or iterations run out.
 
-    Where a later round has no value, the outcome is that of the one before. Where it ends with violated inequalities,
-    which the design of the round before met as they were then, it is repeated from the run's start.
+    Where a later round has no value, the outcome is that of the one before.
 
     Args:
         objective: the one that is minimised.
         begin: where the first round starts.
         first: the first round.
         options: of the correction.
-        origin: where the run starts, which later rounds may do again.
         minimise: the optimum of one round, and that round with the values at its start.
         truth: values of the simulation that counts.
         continued: the optimiser's memory at the start of the next round, from that at the end of the last.
@@ -177,9 +174,6 @@ def correct(
     while True:
         try:
             optimum, round = minimise(begin, round)
-            if optimum.reason is Reason.VIOLATED and last is not None:
-                again = Start(origin, optimum.number, optimum.evaluations)
-                optimum, round = minimise(again, round)
             reached = truth(optimum)
         except Infeasible as failure:
             if last is None:
@@ -337,8 +331,12 @@ class CorrectedRun:
         if self._found is not None:
             start = self._found.start
             return start, low.rest.placement_from(start.parameters, self._found.handles), self._found.round
-        parameters, near = (low.rest.initial, None) if self._start is None else low.given(self._start)
+        parameters, near = self._given(low)
         return Start(parameters), near, first
+
+    def _given(self, low: DesignedSimulation) -> tuple[np.ndarray, HandlePlacement | None]:
+        """Parameters of the run's start, and its handles if known."""
+        return (low.rest.initial, None) if self._start is None else low.given(self._start)
 
     def _rounds(
         self,
@@ -360,14 +358,17 @@ class CorrectedRun:
             begin,
             first,
             self._options,
-            origin=low.rest.initial if self._start is None else low.given(self._start)[0],
             minimise=lambda begin, round: self._minimise(low, begin, round),
             truth=lambda optimum: self._comm.bcast(truth(optimum), root=0),
             continued=self._optimiser.continued,
         )
 
     def _minimise(self, low: DesignedSimulation, begin: Start, round: Round) -> tuple[Optimum, Round]:
-        """The optimum of a round, and the round with values and objective at the start of the optimisation."""
+        """The optimum of a round, and the round with values and objective at the start of the optimisation.
+
+        A later round that ends with violated inequalities, which the design of the round before met as they were then,
+        is repeated from the run's start.
+        """
         _, objective = low.team
         objective.correction, found, self._found = np.array(round.correction), self._found, None
         if found is not None and found.ended is not None and found.ended[1] == repr(self._optimiser):
@@ -395,4 +396,7 @@ class CorrectedRun:
         name = f"design, {space}" if number == 1 else f"design, {space}, round {number}"
         with DesignProgress(self._optimiser, leads=self._comm.rank == 0, name=name) as progress:
             optimum = minimise_together(self._comm, objective, self._optimiser, begin, watch=watch)
+            if optimum.reason is Reason.VIOLATED and round.changes:
+                again = Start(self._given(low)[0], optimum.number, optimum.evaluations)
+                optimum = minimise_together(self._comm, objective, self._optimiser, again, watch=watch)
         return optimum, self._comm.bcast(round, root=0)

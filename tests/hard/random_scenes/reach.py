@@ -168,9 +168,8 @@ def least_stretch(potential: Potential, u: np.ndarray, poses: np.ndarray, travel
 
     def fitted(unknowns: np.ndarray, wanted: float) -> OptimizeResult | None:
         """None where a fit runs off beyond all numbers."""
-        options = {"xtol": 1e-12, "ftol": _TOLERANCE, "max_nfev": _EVALUATIONS}
         try:
-            return least_squares(residual, unknowns, args=(wanted,), **options)
+            return least_squares(residual, unknowns, args=(wanted,), xtol=1e-12, ftol=_TOLERANCE, max_nfev=_EVALUATIONS)
         except ValueError:
             return None
 
