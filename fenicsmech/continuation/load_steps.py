@@ -85,6 +85,7 @@ class LoadSteps:
         failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
             itself. Those before an equilibrium that was reached do not count.
         failures_held: likewise where joints and motors hold the point that is to move.
+        failures_hidden: likewise where the rounding of stiff links hides what resists.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -114,6 +115,7 @@ class LoadSteps:
     motion: float = 0.2
     failures: int = 40
     failures_held: int = 8
+    failures_hidden: int = 3
     smallest_limited: float = 1e-6
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
@@ -130,7 +132,8 @@ class LoadSteps:
     snap_iterations: int = 4
 
     def __post_init__(self) -> None:
-        set_options(self, "load steps", failures=1, failures_held=1, iterations=1, arc_steps=1, snap_iterations=1)
+        whole = ("failures", "failures_held", "failures_hidden", "iterations", "arc_steps", "snap_iterations")
+        set_options(self, "load steps", **dict.fromkeys(whole, 1))
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 
@@ -165,6 +168,7 @@ class LoadStepsFailed(Exception):
         reason: the solver's message.
         tried: control values without equilibrium.
         fold: the control value at which the path turns back, None if it does not.
+        hidden: whether the rounding of stiff links hides what resists at the last equilibrium.
     """
 
     def __init__(
@@ -173,10 +177,13 @@ class LoadStepsFailed(Exception):
         reached: float,
         reason: str,
         tried: tuple[float, ...],
+        *,
         fold: float | None = None,
+        hidden: bool = False,
     ) -> None:
         super().__init__(reason)
-        self.last, self.reached, self.reason, self.tried, self.fold = last, reached, reason, tried, fold
+        self.last, self.reached, self.reason, self.tried = last, reached, reason, tried
+        self.fold, self.hidden = fold, hidden
 
 
 class LoadStepper(Stepper):
@@ -245,11 +252,15 @@ class LoadStepper(Stepper):
                 failed, halved = failed + 1, True
                 step = 0.5 * (value - self._value)
                 smallest = steps.smallest if beyond is None else steps.smallest_snap_step
-                if abs(step) > smallest * self._scale(distance) and failed < steps.failures:
+                ended = abs(step) <= smallest * self._scale(distance) or failed >= steps.failures
+                hidden = (failed == steps.failures_hidden or (ended and beyond is None)) and self._hidden(control)
+                if not (ended or hidden):
                     continue
                 if beyond is None:
-                    fold = self._fold(tried[-1])
-                    raise LoadStepsFailed(self._last, self._value, failure.reason, tuple(tried), fold) from failure
+                    fold, reason = self._fold(tried[-1]), failure.reason
+                    raise LoadStepsFailed(
+                        self._last, self._value, reason, tuple(tried), fold=fold, hidden=hidden
+                    ) from failure
                 point, snapped, step = beyond, True, beyond.control.prescribed - self._value
             if snapped:
                 self.snaps += 1
@@ -272,6 +283,14 @@ class LoadStepper(Stepper):
     @property
     def _last(self) -> EquilibriumPoint | None:
         return self._points[-1] if self._points else None
+
+    def _hidden(self, control: Control) -> bool:
+        """Whether the rounding of stiff links hides what resists at the last equilibrium."""
+        state = self._last.state if self._last else self._start
+        try:
+            return self.solver.linearise(state, control.at(self._value)).drowns_modes
+        except NotConverged:
+            return False
 
     def _fold(self, tried: float) -> float | None:
         """The value v* at which the path turns back, if it does before ``tried`` or about there.

@@ -2,25 +2,36 @@
 
 Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
 fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no link, and
-so do their errors: the work along these is precise.
+so do their errors: the work along these is precise. Where Newton's method, to which rounding hides these works, leaves
+the position out of balance, all links move along such motions m alone to where the works w vanish,
+
+    q ← q − (∂w/∂q)⁻¹ w,     w_i = ∇(V + E_effects − loads) · m_i,
+
+by differences, along those motions of the moved links that are nearest to the ones before.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import agreed, from_one
 from fenicsmech.continuation import LoadSteps
-from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State
+from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Motion, stiff_motions
 
 _BALANCED = 1e-6  # work over loads times the greatest velocity that is small
 _ROUNDING = 1e-16  # least relative residual
+_DIFFERENCE = 1e-4  # rad, or over the mechanism's length, by which links move for the slopes of works
+_LARGEST = 0.1  # likewise in one step
+_ITERATIONS = 10  # to vanishing works
+_ROUNDS = 4  # of moving links and relaxing them
 
 
 class Balance:
@@ -32,7 +43,7 @@ class Balance:
     """
 
     def __init__(self, model: MechanismModel, solver: EquilibriumSolver) -> None:
-        self._model, self._solver = model, solver
+        self._model, self._solver, self._comm = model, solver, model.mesh.mesh.comm
 
     def improved(self, point: EquilibriumPoint, control: Control) -> tuple[EquilibriumPoint, float, int]:
         """The equilibrium at ``point``, or near it if loads balance better there; their imbalance; iterations spent.
@@ -58,39 +69,95 @@ class Balance:
             if left < 0.5 * imbalance and found.unstable_modes <= point.unstable_modes:
                 point, imbalance = found, left
             if imbalance <= _BALANCED:
-                break
+                return point, imbalance, iterations
+        rested, left, spent = self._rested(point, control, finer)
+        if left < 0.5 * imbalance and rested.unstable_modes <= point.unstable_modes:
+            point, imbalance = rested, left
+        return point, imbalance, iterations + spent
+
+    def _rested(
+        self, point: EquilibriumPoint, control: Control, solver: EquilibriumSolver
+    ) -> tuple[EquilibriumPoint, float, int]:
+        """The equilibrium to which motions that deform no link lead from ``point``; its imbalance; iterations spent.
+
+        Where far motions strain links, or open joints, the ``solver`` relaxes them, and the links move on from there.
+        """
+        system, iterations, imbalance = self._solver.system, 0, np.inf
+        for _ in range(_ROUNDS):
+            state = self._balanced(point.state, control)
+            system.load(state)
+            residual = system.residual(state, control)
+            try:
+                if residual.norm <= solver.rounding(residual):
+                    point = solver.linearise(state, control, residual).point(point.residuals, point.iterations)
+                    return point, self.imbalance(state, control), iterations
+                point = solver.solve(state, control)
+            except NotConverged as failure:
+                return point, imbalance, iterations + failure.iterations
+            iterations, imbalance = iterations + point.iterations, self.imbalance(point.state, control)
         return point, imbalance, iterations
+
+    def _balanced(self, state: State, control: Control) -> State:
+        """``state`` moved along motions that deform no link to where works along these vanish."""
+        for _ in range(_ITERATIONS):
+            motions = self._motions(state)
+            works = self._works(state, control, motions)
+            slopes = np.transpose([self._slope(state, control, motions, works, k) for k in range(len(motions))])
+            # of one process: small slopes are decisions that depend on rounding
+            q = from_one(self._comm, partial(_least, slopes, -works))
+            state = self._moved(state, motions, q * min(1.0, _LARGEST / max(np.abs(q).max(), _LARGEST)))
+            if self.imbalance(state, control) <= 1e-3 * _BALANCED:
+                break
+        return state
+
+    def _slope(
+        self, state: State, control: Control, motions: Sequence[Motion], works: np.ndarray, k: int
+    ) -> np.ndarray:
+        """∂w/∂q_k of ``works`` w along ``motions``, (motions,)."""
+        there = self._moved(state, [motions[k]], np.array([_DIFFERENCE]))
+        moved, scale = self._motions(there), self._solver.system.joints.pose_scale
+        own, wanted = (np.column_stack([motion.z / scale for motion in each]) for each in (moved, motions))
+        nearest = from_one(self._comm, partial(_least, own, wanted)).T
+        return (nearest @ self._works(there, control, moved) - works) / _DIFFERENCE
+
+    def _motions(self, state: State) -> list[Motion]:
+        """Those that deform no link, on all processes the same basis."""
+        return from_one(self._comm, lambda: stiff_motions(self._model.linkage, state.poses, state.motors))
+
+    def _moved(self, state: State, motions: Sequence[Motion], q: np.ndarray) -> State:
+        """``state`` after all links have turned along ``motions``, by q (motions,)."""
+        u, z = np.zeros(len(state.u)), np.zeros(self._solver.system.joints.size)
+        for motion, way in zip(motions, q, strict=True):
+            velocity = self._velocity(state, motion)
+            u[: len(velocity)] += way * velocity
+            z += way * motion.z
+        return self._solver.system.turned(state, Step(u, z, np.zeros(len(state.multipliers)), 0.0))
 
     def imbalance(self, state: State, control: Control) -> float:
         """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.
 
-        Of the work of each reaction, 1e-12 is left by rounding of their sum, which vanishes, and of effects 1e-14 of
-        what balances on each link; 0 where nothing acts, or nothing moves. Links do no work where nothing strains them,
-        however their nodal forces are rounded: those of loads and effects count.
+        Of the work of effects 1e-14 of what balances on each link is left by rounding; 0 where nothing acts, or nothing
+        moves.
         """
-        model, system = self._model, self._solver.system
-        system.load(state)
-        joints, rigid = model.linkage.joints, system.residual(state, control).rigid
-        nodal = -system.nodal_loads(state)
-        own = np.zeros(len(nodal))  # of effects, at load factor 1
-        if model.elastic.depends_on_load_factor:
-            own = model.elastic.load_factor_residuals()[: len(nodal)]
-            nodal += state.load_factor * own
-        effects, cancelled = self._effect_forces(own, state)
-        loads = abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum()) + effects
-        worst = 0.0
-        reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
-        # all processes take the same basis of the motions
-        comm = model.mesh.mesh.comm
-        for motion in from_one(comm, lambda: stiff_motions(model.linkage, state.poses, state.motors)):
-            fastest = motion.fastest(model.linkage.length)
-            rounding = 1e-12 * float(reactions @ np.abs(motion.z)) + 1e-14 * cancelled * fastest
-            work = abs(self._work(nodal, state, motion) + float(rigid @ motion.z))
-            worst = max(worst, (work - rounding) / fastest)
-        return agreed(comm, worst / loads if loads > 0.0 else 0.0)
+        motions = self._motions(state)
+        works, (loads, cancelled) = self._works(state, control, motions), self._sizes(state)
+        speeds = (motion.fastest(self._model.linkage.length) for motion in motions)
+        shares = [abs(work) / speed - 1e-14 * cancelled for work, speed in zip(works, speeds, strict=True)]
+        return agreed(self._comm, max(shares, default=0.0) / loads if loads > 0.0 else 0.0)
 
-    def _work(self, nodal: np.ndarray, state: State, motion: Motion) -> float:
-        """r · u̇ of ``nodal`` forces r on links, (owned displacements,), along a motion."""
+    def _works(self, state: State, control: Control, motions: Sequence[Motion]) -> np.ndarray:
+        """Works along ``motions`` of what acts, (motions,): neither links that nothing strains nor joints that stay
+        closed do any, however their forces are rounded."""
+        system = self._solver.system
+        system.load(state)
+        acting = replace(state, multipliers=np.zeros(len(state.multipliers)))
+        rigid = system.residual(acting, control).rigid
+        nodal = state.load_factor * self._effects() - system.nodal_loads(state)
+        own = np.array([nodal @ self._velocity(state, motion) for motion in motions])
+        return self._comm.allreduce(own) + np.array([rigid @ motion.z for motion in motions])
+
+    def _velocity(self, state: State, motion: Motion) -> np.ndarray:
+        """Velocities of owned nodes of links along a motion, (owned displacements,)."""
         model, linkage, owned = self._model, self._model.linkage, self._model.interfaces.owned
         u = state.u[: owned * model.interfaces.block].reshape(owned, -1)
         places = u + model.elastic.drawn_nodes[:owned] + model.design_nodes.values(model.elastic.design)[:owned]
@@ -101,15 +168,20 @@ class Balance:
             centre = np.array(linkage.bodies[body].centre) + state.poses[body, : linkage.dim]
             offsets = places[nodes][:, : linkage.dim] - centre
             velocity[nodes, : linkage.dim] = motion.at(body, offsets)
-        return model.mesh.mesh.comm.allreduce(float(nodal @ velocity.ravel()))
+        return velocity.ravel()
 
-    def _effect_forces(self, own: np.ndarray, state: State) -> tuple[float, float]:
-        """Sum of the sizes of all forces of effects that grow with the load factor; the same of what balances.
+    def _effects(self) -> np.ndarray:
+        """Forces of effects at load factor 1 on owned nodes, at the loaded state, (owned displacements,)."""
+        elastic, size = self._model.elastic, self._model.interfaces.owned * self._model.interfaces.block
+        return elastic.load_factor_residuals()[:size] if elastic.depends_on_load_factor else np.zeros(size)
 
-        Those on a flexible link, ``own``, count by their sum: what balances on each link, as pressure all around it
+    def _sizes(self, state: State) -> tuple[float, float]:
+        """Sum of the sizes of all loads at the loaded ``state``, those of effects included; the same of what balances.
+
+        Those of effects on a flexible link count by their sum: what balances on each link, as pressure all around it
         does, works along no motion that deforms none.
         """
-        model, comm = self._model, self._model.mesh.mesh.comm
+        model, comm, own = self._model, self._comm, self._effects()
         link, links = model.node_link[: model.interfaces.owned], len(model.mechanism.flexible_links)
         sums = np.array(
             [np.bincount(link, part, minlength=links) for part in own.reshape(len(link), model.interfaces.block).T]
@@ -121,4 +193,9 @@ class Balance:
                 slope = potential.gradient(state.poses).reshape(len(potential.bodies), -1)
                 total += float(np.abs(slope[:, : model.linkage.dim]).sum())
                 total += float(np.abs(slope[:, model.linkage.dim :]).sum()) / model.linkage.length
-        return total, cancelled
+        return abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum()) + total, cancelled
+
+
+def _least(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The least-squares solution."""
+    return np.linalg.lstsq(matrix, right, rcond=None)[0]

@@ -42,6 +42,7 @@ from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestPoses
 
 _log = logger(__name__)
+_STIFF = 1e-3  # nodal stiffness over the largest, above which rounding of links hides others
 _LOST = 1e-4  # work along motions that deform no link, over loads times the greatest velocity, that leaves rest unknown
 
 
@@ -153,7 +154,7 @@ class CurveStepper:
                     point = steps.advance(control)
             except LoadStepsFailed as failure:
                 # the first value was sought from rest
-                found = self._from_rest(control) if steps.snaps and iterations else None
+                found = self._from_rest(control) if steps.snaps and iterations and not failure.hidden else None
                 if found is None:
                     raise self._unreached(control, failure) from failure
                 point = found
@@ -259,6 +260,8 @@ class CurveStepper:
             for value in np.linspace(fraction, 1.0, steps + 1)[1:]:
                 state = stepper.advance(control.at(float(value))).state
         except LoadStepsFailed as failure:
+            if failure.hidden:
+                raise self._unposed(failure, fraction, wound) from failure
             try:
                 first = self.solver.solve(start, control)
                 point, iterations, _ = follow_to(
@@ -328,10 +331,13 @@ class CurveStepper:
             turn = ", ".join(f"{motor.name!r} at {failure.fold * position:.6g}" for motor, position in moved)
             tried = f"the path turns back near {turn}; {tried}"
             nearer = "before the turn, which follow() goes round"
+        remedy = (
+            self._stiffer_or_rigid if failure.hidden else f"Choose motor positions {nearer}, or a softer link or spring"
+        )
         return EquilibriumError(
             f"configuration {configuration.name!r}",
             f"the motors strain {strained}, and no equilibrium was found {beyond} ({tried})",
-            f"Choose motor positions {nearer}, or a softer link or spring",
+            remedy,
             last=self._last(failure),
         )
 
@@ -357,9 +363,10 @@ class CurveStepper:
                 )
                 self._effort += Effort(snaps=1)
                 return found
-            if (found := self._snapped(failure, control, "constant loads")) is not None:
+            if not failure.hidden and (found := self._snapped(failure, control, "constant loads")) is not None:
                 return found
-            if (found := self._followed(start, control.at(0.5 * failure.reached))) is not None:
+            halfway = control.at(0.5 * failure.reached)
+            if not failure.hidden and (found := self._followed(start, halfway)) is not None:
                 return found
             forces = [repr(force.name) for force, _ in self.request.others]
             names = ", ".join([*forces, *(effect.explain() for effect in self._model.effects)])
@@ -475,16 +482,13 @@ class CurveStepper:
         if self._springs_below_rounding:
             otherwise = (
                 "The springs are softer than the rounding of the stiffest links: "
-                "make links rigid that hardly bend, or springs stiffer"
+                f"make {self._stiffest_links} rigid, or springs stiffer"
             )
         elif self.freedom.zero_energy:
             names = ", ".join(map(repr, self.freedom.zero_energy))
             otherwise = f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
         elif self._links_below_rounding(last.state if last else self.unloaded):
-            otherwise = (
-                "What resists some motion is less than the rounding of the stiffest link: "
-                "make links rigid that hardly bend, or soft ones stiffer"
-            )
+            otherwise = self._stiffer_or_rigid
         return EquilibriumError(where, problem, otherwise, last=last, frames=self.frames)
 
     def _last(self, failure: LoadStepsFailed) -> Frame | None:
@@ -508,6 +512,20 @@ class CurveStepper:
             return self.solver.linearise(state, control).drowns_modes
         except NotConverged:
             return False
+
+    @property
+    def _stiffer_or_rigid(self) -> str:
+        """The remedy where soft links resist less than the rounding of stiff ones."""
+        hidden = "What resists some motion is less than the rounding of the stiffest links"
+        return f"{hidden}: make {self._stiffest_links} rigid, or soft ones stiffer"
+
+    @property
+    def _stiffest_links(self) -> str:
+        """The links whose nodal stiffness, E b of width b, is more than a thousandth of the largest, by name."""
+        model = self._model
+        stiffness = [material.law.E * depth for material, depth in zip(model.materials, model.depths, strict=True)]
+        links = zip(model.mechanism.flexible_links, stiffness, strict=True)
+        return ", ".join(repr(link.name) for link, own in links if own > _STIFF * max(stiffness))
 
     @cached_property
     def _springs_below_rounding(self) -> bool:

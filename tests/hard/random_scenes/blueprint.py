@@ -6,7 +6,7 @@ Numbers stay as they are until ``build`` hands them to the package: whatever is 
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 from mpi4py import MPI
@@ -235,6 +235,13 @@ class Blueprint:
         """The same scene with larger elements and fewer loads."""
         links = tuple(replace(link, size=1.6 * link.size) if link.centreline else link for link in self.links)
         return replace(self, links=links, samples=self.samples[-1:], most=12)
+
+    def stiffened(self, names: Collection[str]) -> Blueprint:
+        """The same scene with links of some ``names`` rigid."""
+        links = tuple(replace(link, centreline=()) if link.name in names else link for link in self.links)
+        bending = {link.name for link in links if link.centreline}
+        joints = tuple(j if bending & {j.a, j.b} else replace(j, interface=None) for j in self.joints)
+        return replace(self, links=links, joints=joints)
 
     def shuffled(self, seed: int) -> Blueprint:
         """The same scene with links and joints in another order."""

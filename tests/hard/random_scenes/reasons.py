@@ -15,7 +15,7 @@ import numpy as np
 import fenicsmech as fm
 
 from .assembly_check import smallest_gap
-from .blueprint import Blueprint, Built, CompliancePlan, ContactPlan, GravityPlan, SpringPlan
+from .blueprint import Blueprint, Built, CompliancePlan, ContactPlan, GravityPlan, LinkPlan, SpringPlan, build
 from .closure import Place
 from .motions import STEP, body_modes, moved
 from .potential import Potential
@@ -147,6 +147,41 @@ def drowned(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) ->
     share = softest / max(link.young * link.depth for link in blueprint.flexible)
     reason = "springs softer than the rounding of stiff links"
     return _excuse(reason, "stiffness over the stiffest link's", share, below=THRESHOLDS.drowned)
+
+
+def outweighed(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
+    """A soft link resists less than the rounding of stiff ones. The error says so, names them, and its remedy holds.
+
+    What a cantilever of modulus E, length l and second moment I resists at its end, 3 E I / l³, of the softest link
+    over the nodal stiffnesses E b of the stiffest one, of width b. Each is rounded to 1e-16, some thousand nodes have
+    ten thousand of them, and a hundredth of what resists must stand out of that: 1e-12. With the links that the remedy
+    names rigid the scene must end in equilibria.
+    """
+    if "rounding of the stiffest links" not in failure.remedy:
+        return None
+    named = {link.name for link in blueprint.flexible if repr(link.name) in failure.remedy}
+    share = min(map(_bending, blueprint.flexible)) / max(link.young * link.depth for link in blueprint.flexible)
+    if share >= THRESHOLDS.outweighed or not _ends_in_equilibria(blueprint.stiffened(named)):
+        return None
+    reason = "soft links resist less than the rounding of stiff ones"
+    return _excuse(reason, "stiffness over theirs", share, below=THRESHOLDS.outweighed)
+
+
+def _bending(link: LinkPlan) -> float:
+    """3 E I / l³ of a link about the axis along which it is thinner, N/mm."""
+    length = float(np.linalg.norm(np.diff(link.centreline, axis=0), axis=1).sum())
+    thin, wide = sorted((link.thickness, link.depth))
+    return link.young * wide * thin**3 / (4.0 * length**3)
+
+
+def _ends_in_equilibria(blueprint: Blueprint) -> bool:
+    """Whether all that the scene asks for is found."""
+    try:
+        built = build(blueprint)
+        frames = built.curve(blueprint).frames
+    except fm.FenicsmechError:
+        return False
+    return all(_proven(blueprint, built, frame) for frame in frames)
 
 
 def unheard(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
@@ -320,7 +355,7 @@ def _preloaded(blueprint: Blueprint) -> bool:
 
 
 _Reason = Callable[[Blueprint, Built, fm.EquilibriumError], Excuse | None]
-_BY_GEOMETRY: tuple[_Reason, ...] = (immobile, adrift, drowned, unheard, turned_back_by_motors)
+_BY_GEOMETRY: tuple[_Reason, ...] = (immobile, adrift, drowned, unheard, turned_back_by_motors, outweighed)
 _BY_STATE: tuple[_Reason, ...] = (at_limit, out_of_reach, inverted, overstrained, turned_back)
 
 

@@ -40,6 +40,7 @@ class Thresholds:
         followed: most frames of a path that is to turn back.
         turned: what a curve has reached over where the path turns back, at least.
         drowned: stiffness of springs over that of the stiffest link at which rounding hides it.
+        outweighed: stiffness of the softest link over the stiffest one's nodal stiffness at which rounding hides it.
         unheard: force over the stiffest link's E b ℓ that rounding hides, of the mechanism's length ℓ.
         excused: share of the scenes that make sense that each excuse may let off.
         held: share of those in which joints and motors hold the point, which is exact.
@@ -85,6 +86,7 @@ class Thresholds:
     followed: int = 200
     turned: float = 0.9
     drowned: float = 1e-14
+    outweighed: float = 1e-12
     unheard: float = 1e-16
     excused: float = 0.03
     held: float = 0.12
