@@ -85,7 +85,8 @@ class LoadSteps:
         failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
             itself. Those before an equilibrium that was reached do not count.
         failures_held: likewise where joints and motors hold the point that is to move.
-        failures_hidden: likewise where the rounding of stiff links hides what resists.
+        failures_hidden: to one value, in a row or not, after which stepping fails where the rounding of stiff links hides
+            what resists.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -132,8 +133,16 @@ class LoadSteps:
     snap_iterations: int = 4
 
     def __post_init__(self) -> None:
-        whole = ("failures", "failures_held", "failures_hidden", "iterations", "arc_steps", "snap_iterations")
-        set_options(self, "load steps", **dict.fromkeys(whole, 1))
+        set_options(
+            self,
+            "load steps",
+            failures=1,
+            failures_held=1,
+            failures_hidden=1,
+            iterations=1,
+            arc_steps=1,
+            snap_iterations=1,
+        )
         factors = tuple(not_negative("shift factor of load steps", factor) for factor in self.shift_factors)
         set_fields(self, shift_factors=factors)
 
@@ -253,7 +262,9 @@ class LoadStepper(Stepper):
                 step = 0.5 * (value - self._value)
                 smallest = steps.smallest if beyond is None else steps.smallest_snap_step
                 ended = abs(step) <= smallest * self._scale(distance) or failed >= steps.failures
-                hidden = (failed == steps.failures_hidden or (ended and beyond is None)) and self._hidden(control)
+                hidden = False
+                if len(tried) >= steps.failures_hidden or (ended and beyond is None):
+                    hidden = self._plain.hides(self._last.state if self._last else self._start, control.at(self._value))
                 if not (ended or hidden):
                     continue
                 if beyond is None:
@@ -283,14 +294,6 @@ class LoadStepper(Stepper):
     @property
     def _last(self) -> EquilibriumPoint | None:
         return self._points[-1] if self._points else None
-
-    def _hidden(self, control: Control) -> bool:
-        """Whether the rounding of stiff links hides what resists at the last equilibrium."""
-        state = self._last.state if self._last else self._start
-        try:
-            return self.solver.linearise(state, control.at(self._value)).drowns_modes
-        except NotConverged:
-            return False
 
     def _fold(self, tried: float) -> float | None:
         """The value v* at which the path turns back, if it does before ``tried`` or about there.
@@ -446,7 +449,8 @@ class DeadCentreStepper(LoadStepper):
         try:
             return super().advance(control)
         except LoadStepsFailed as failure:
-            if failure.last is None or not self._pass_dead_centre(failure.last, failure.tried[-1], control):
+            last = None if failure.hidden else failure.last
+            if last is None or not self._pass_dead_centre(last, failure.tried[-1], control):
                 raise
         return super().advance(control)
 

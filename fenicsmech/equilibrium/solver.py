@@ -127,6 +127,13 @@ class EquilibriumSolver(ABC):
             raise NotConverged("the KKT matrix at the equilibrium cannot be factored", iterations)
         return Linearisation(self.system, self.linear, state, control, residual)
 
+    def hides(self, state: State, control: Control) -> bool:
+        """Whether the rounding of stiff links hides what resists some motion at a ``state``."""
+        try:
+            return self.linearise(state, control).drowns_modes
+        except NotConverged:
+            return False
+
     # -- parts of iterations -----------------------------------------------------------------------------------
 
     def factor(self, shift: float, *, least: bool = True) -> bool:

@@ -2,35 +2,33 @@
 
 Rounding of the nodal forces of stiff links may exceed small loads, so that a residual of the size of rounding does not
 fix the rest position of a zero-energy mode. The forces inside an element cancel along motions that deform no link, and
-so do their errors: the work along these is precise. Where Newton's method, to which rounding hides these works, leaves
-the position out of balance, all links move along such motions m alone to where the works w vanish,
+so do their errors: the work along these is precise. Where Newton's method, from which rounding hides it, leaves a
+position out of balance, all links move along such motions m alone to where the works w vanish,
 
-    q ← q − (∂w/∂q)⁻¹ w,     w_i = ∇(V + E_effects − loads) · m_i,
+    q ← q − |H|⁻¹ w,     w_i = ∇(V + E_effects − loads) · m_i,     H = ∂w/∂q,
 
-by differences, along those motions of the moved links that are nearest to the ones before.
+H by differences, along those motions of the moved links that are nearest to the ones before; |H|, which descends, has
+the moduli of its eigenvalues. From an unstable equilibrium H itself leads to the one near.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from mpi4py import MPI
 
 from fenicsmech.collective import agreed, from_one
-from fenicsmech.continuation import LoadSteps
 from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
 from fenicsmech.model import MechanismModel
 from fenicsmech.multibody import Motion, stiff_motions
 
 _BALANCED = 1e-6  # work over loads times the greatest velocity that is small
-_ROUNDING = 1e-16  # least relative residual
 _DIFFERENCE = 1e-4  # rad, or over the mechanism's length, by which links move for the slopes of works
 _LARGEST = 0.1  # likewise in one step
 _ITERATIONS = 10  # to vanishing works
+_FELT = 1e-12  # slope over the largest
 _ROUNDS = 4  # of moving links and relaxing them
 
 
@@ -48,43 +46,26 @@ class Balance:
     def improved(self, point: EquilibriumPoint, control: Control) -> tuple[EquilibriumPoint, float, int]:
         """The equilibrium at ``point``, or near it if loads balance better there; their imbalance; iterations spent.
 
-        Beside reactions ten thousand times the loads, a residual that is small leaves motions that these alone resist,
-        as the spin of a link between ball joints, far from where they come to rest: there it must be smaller still.
+        Beside reactions ten thousand times the loads, too, a residual that is small leaves motions that these alone
+        resist, as the spin of a link between ball joints, far from where they come to rest.
         """
-        imbalance, options, iterations = self.imbalance(point.state, control), self._solver.options, 0
+        imbalance = self.imbalance(point.state, control)
         if imbalance <= _BALANCED:
-            return point, imbalance, iterations
-        reached = min(options.tolerance, max(point.residuals[-1], _ROUNDING))
-        finer = copy(self._solver.turning or self._solver)  # with the same factor
-        finer.options = replace(options, tolerance=0.1 * _BALANCED / imbalance * reached)
-        # shifts slow steps down along the motions that are out of balance
-        for shift in LoadSteps().least_shifts(point.state.minimum_shift).elsewhere:
-            try:
-                found = finer.solve(replace(point.state, minimum_shift=shift), control)
-            except NotConverged as failure:
-                iterations += failure.iterations
-                continue
-            iterations += found.iterations
-            left = self.imbalance(found.state, control)
-            if left < 0.5 * imbalance and found.unstable_modes <= point.unstable_modes:
-                point, imbalance = found, left
-            if imbalance <= _BALANCED:
-                return point, imbalance, iterations
-        rested, left, spent = self._rested(point, control, finer)
+            return point, imbalance, 0
+        rested, left, iterations = self._rested(point, control)
         if left < 0.5 * imbalance and rested.unstable_modes <= point.unstable_modes:
-            point, imbalance = rested, left
-        return point, imbalance, iterations + spent
+            return rested, left, iterations
+        return point, imbalance, iterations
 
-    def _rested(
-        self, point: EquilibriumPoint, control: Control, solver: EquilibriumSolver
-    ) -> tuple[EquilibriumPoint, float, int]:
+    def _rested(self, point: EquilibriumPoint, control: Control) -> tuple[EquilibriumPoint, float, int]:
         """The equilibrium to which motions that deform no link lead from ``point``; its imbalance; iterations spent.
 
-        Where far motions strain links, or open joints, the ``solver`` relaxes them, and the links move on from there.
+        Where far motions strain links, or open joints, Newton's method relaxes them, and the links move on from there.
         """
-        system, iterations, imbalance = self._solver.system, 0, np.inf
+        solver, iterations, imbalance = self._solver.turning or self._solver, 0, np.inf
+        system = solver.system
         for _ in range(_ROUNDS):
-            state = self._balanced(point.state, control)
+            state = self._balanced(point, control)
             system.load(state)
             residual = system.residual(state, control)
             try:
@@ -97,14 +78,15 @@ class Balance:
             iterations, imbalance = iterations + point.iterations, self.imbalance(point.state, control)
         return point, imbalance, iterations
 
-    def _balanced(self, state: State, control: Control) -> State:
-        """``state`` moved along motions that deform no link to where works along these vanish."""
+    def _balanced(self, point: EquilibriumPoint, control: Control) -> State:
+        """The state of ``point`` moved along motions that deform no link to where works along these vanish."""
+        state, descend = point.state, point.unstable_modes == 0
         for _ in range(_ITERATIONS):
             motions = self._motions(state)
             works = self._works(state, control, motions)
-            slopes = np.transpose([self._slope(state, control, motions, works, k) for k in range(len(motions))])
-            # of one process: small slopes are decisions that depend on rounding
-            q = from_one(self._comm, partial(_least, slopes, -works))
+            slopes = np.array([self._slope(state, control, motions, works, k) for k in range(len(motions))])
+            # of one process: signs of slopes are decisions that depend on rounding
+            q = from_one(self._comm, partial(_newton_step, slopes, works, descend))
             state = self._moved(state, motions, q * min(1.0, _LARGEST / max(np.abs(q).max(), _LARGEST)))
             if self.imbalance(state, control) <= 1e-3 * _BALANCED:
                 break
@@ -113,11 +95,13 @@ class Balance:
     def _slope(
         self, state: State, control: Control, motions: Sequence[Motion], works: np.ndarray, k: int
     ) -> np.ndarray:
-        """∂w/∂q_k of ``works`` w along ``motions``, (motions,)."""
+        """∂w/∂q_k of ``works`` w along ``motions``, (motions,); zero where no link can move so, as in a dead centre."""
         there = self._moved(state, [motions[k]], np.array([_DIFFERENCE]))
         moved, scale = self._motions(there), self._solver.system.joints.pose_scale
+        if not moved:
+            return np.zeros(len(works))
         own, wanted = (np.column_stack([motion.z / scale for motion in each]) for each in (moved, motions))
-        nearest = from_one(self._comm, partial(_least, own, wanted)).T
+        nearest = from_one(self._comm, lambda: np.linalg.lstsq(own, wanted, rcond=None)[0]).T
         return (nearest @ self._works(there, control, moved) - works) / _DIFFERENCE
 
     def _motions(self, state: State) -> list[Motion]:
@@ -136,22 +120,25 @@ class Balance:
     def imbalance(self, state: State, control: Control) -> float:
         """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.
 
-        Of the work of effects 1e-14 of what balances on each link is left by rounding; 0 where nothing acts, or nothing
-        moves.
+        Of the work of each reaction, 1e-12 is left by rounding of their sum, which vanishes, and of effects 1e-14 of
+        what balances on each link; 0 where nothing acts, or nothing moves.
         """
-        motions = self._motions(state)
+        motions, joints = self._motions(state), self._model.linkage.joints
         works, (loads, cancelled) = self._works(state, control, motions), self._sizes(state)
-        speeds = (motion.fastest(self._model.linkage.length) for motion in motions)
-        shares = [abs(work) / speed - 1e-14 * cancelled for work, speed in zip(works, speeds, strict=True)]
-        return agreed(self._comm, max(shares, default=0.0) / loads if loads > 0.0 else 0.0)
+        reactions = np.abs(state.multipliers) @ np.abs(joints.gradient(state.poses, state.motors))
+        worst = 0.0
+        for motion, work in zip(motions, works, strict=True):
+            speed = motion.fastest(self._model.linkage.length)
+            rounding = 1e-12 * float(reactions @ np.abs(motion.z)) + 1e-14 * cancelled * speed
+            worst = max(worst, (abs(work) - rounding) / speed)
+        return agreed(self._comm, worst / loads if loads > 0.0 else 0.0)
 
     def _works(self, state: State, control: Control, motions: Sequence[Motion]) -> np.ndarray:
-        """Works along ``motions`` of what acts, (motions,): neither links that nothing strains nor joints that stay
-        closed do any, however their forces are rounded."""
+        """Works along ``motions``, (motions,). Links do none where nothing strains them, however their nodal forces are
+        rounded: those of loads and effects count."""
         system = self._solver.system
         system.load(state)
-        acting = replace(state, multipliers=np.zeros(len(state.multipliers)))
-        rigid = system.residual(acting, control).rigid
+        rigid = system.residual(state, control).rigid
         nodal = state.load_factor * self._effects() - system.nodal_loads(state)
         own = np.array([nodal @ self._velocity(state, motion) for motion in motions])
         return self._comm.allreduce(own) + np.array([rigid @ motion.z for motion in motions])
@@ -196,6 +183,9 @@ class Balance:
         return abs(state.force) + abs(state.load_factor) * float(np.abs(state.constant).sum()) + total, cancelled
 
 
-def _least(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The least-squares solution."""
-    return np.linalg.lstsq(matrix, right, rcond=None)[0]
+def _newton_step(slopes: np.ndarray, works: np.ndarray, descend: bool) -> np.ndarray:
+    """−H⁻¹ w, or −|H|⁻¹ w to ``descend``; motions that nothing resists stay."""
+    values, modes = np.linalg.eigh(0.5 * (slopes + slopes.T))
+    felt = np.abs(values) > _FELT * np.abs(values).max()
+    values, modes = values[felt], modes[:, felt]
+    return -modes @ ((modes.T @ works) / (np.abs(values) if descend else values))

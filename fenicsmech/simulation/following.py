@@ -32,6 +32,8 @@ from fenicsmech.simulation.frame import Frame, ModeShape, mode_shape
 from fenicsmech.simulation.request import CurveRequest, check_force, check_motors, read_others
 from fenicsmech.simulation.stepping import CurveStepper
 
+_FELT = 10.0  # first force over the least one, where rounding hides what that moves
+
 
 @dataclass(frozen=True)
 class Until:
@@ -266,7 +268,14 @@ class CurveFollower:
             reach = linear_reach(point, value=reach, conjugate=conjugate) if moves else 0.0
         if not 0.0 < reach < math.inf:
             raise NotConverged(f"it moves nothing beyond displacement {self._conjugate(state):g}, where travel ends")
-        return self._stepper.frame(LoadControl(math.copysign(self._steps.first_load * reach, self._sense())))
+        least = math.copysign(self._steps.first_load * reach, self._sense())
+        try:
+            return self._stepper.frame(LoadControl(least))
+        except EquilibriumError as lost:  # in rounding
+            try:
+                return self._stepper.frame(LoadControl(_FELT * least))
+            except EquilibriumError:
+                raise lost from None
 
     def from_bifurcation(self, event: PathEvent, mode: ModeShape, sense: Sense) -> FollowedCurve:
         """The curve that crosses another one at ``event`` along ``mode``."""

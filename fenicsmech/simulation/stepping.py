@@ -43,7 +43,7 @@ from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestP
 
 _log = logger(__name__)
 _STIFF = 1e-3  # nodal stiffness over the largest, above which rounding of links hides others
-_LOST = 1e-4  # work along motions that deform no link, over loads times the greatest velocity, that leaves rest unknown
+_LOST = 1e-5  # work along motions that deform no link, over loads times the greatest velocity, that leaves rest unknown
 
 
 class CurveStepper:
@@ -108,6 +108,8 @@ class CurveStepper:
         self._system.load(state)
         resist = (rest.loads_resist and not rest.reached) or self._springs_below_rounding
         steps = LoadSteps()
+        if self.freedom.mobility:  # loads balance along motions that deform no link, whatever is hidden
+            steps = replace(steps, failures_hidden=steps.failures)
         shifts = steps.least_shifts(state.minimum_shift, loads_resist=resist)
         kind = DisplacementControl() if control.constrained else LoadControl()
         if control.constrained and from_one(self.discretisation.comm, lambda: self._is_held(state)):
@@ -487,8 +489,10 @@ class CurveStepper:
         elif self.freedom.zero_energy:
             names = ", ".join(map(repr, self.freedom.zero_energy))
             otherwise = f"Nothing but the force holds {names}: add a joint or a motor, or check the force's direction"
-        elif self._links_below_rounding(last.state if last else self.unloaded):
-            otherwise = self._stiffer_or_rigid
+        else:
+            state = last.state if last else self.unloaded
+            if self.solver.hides(state, self.followed.at(self.followed.value(self._system, state))):
+                otherwise = self._stiffer_or_rigid
         return EquilibriumError(where, problem, otherwise, last=last, frames=self.frames)
 
     def _last(self, failure: LoadStepsFailed) -> Frame | None:
@@ -504,14 +508,6 @@ class CurveStepper:
                 return False
             rate[joints.columns[point.body]] += direction @ point.gradient(state.poses)
         return is_held(joints, state.poses, state.motors, rate, self._system.rigid_rows)
-
-    def _links_below_rounding(self, state: State) -> bool:
-        """Whether soft links resist less than the rounding of stiff ones."""
-        control = self.followed.at(self.followed.value(self._system, state))
-        try:
-            return self.solver.linearise(state, control).drowns_modes
-        except NotConverged:
-            return False
 
     @property
     def _stiffer_or_rigid(self) -> str:

@@ -41,6 +41,9 @@ class Stubborn(OneFreedom):
         self.tried: list[tuple[float, float]] = []  # prescribed value and least shift of each solve
         self.failed = 0
 
+    def hides(self, state: State, control: LoadControl) -> bool:
+        return False
+
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.tried.append((control.prescribed, start.minimum_shift))
         if abs(control.prescribed - self.reached) > self.longest:
@@ -114,6 +117,9 @@ def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(p
 
 class Folded(Stubborn):
     """A path y = p up to p = 0.1; from p = 0.2 on solves end far off, on another one, and in between nowhere."""
+
+    def hides(self, state: State, control: LoadControl) -> bool:
+        return False
 
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         between = 0.1 < control.prescribed < 0.2

@@ -28,6 +28,9 @@ class OneFreedom:
     def __init__(self) -> None:
         self.system, self.solved, self.softest = self, 0, 1.0
 
+    def hides(self, state: State, control: LoadControl) -> bool:
+        return False
+
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.solved += 1
         if control.prescribed > 1.0:

@@ -138,7 +138,7 @@ def test_failure_names_a_link_softer_than_the_rounding_of_the_one_it_carries_as_
     mechanism.weld(feather, anvil, at=(40, 0), interface_radius=1.0)
     push = mechanism.force(on=anvil, at=(80, 0), direction=(0, -1))
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", order=1, size=2.0, comm=MPI.COMM_SELF)
-    with pytest.raises(fm.EquilibriumError, match="less than the rounding of the stiffest link: make links rigid"):
+    with pytest.raises(fm.EquilibriumError, match="less than the rounding of the stiffest links: make 'anvil' rigid"):
         simulation.load_displacement(push, forces=[1e-14])
 
 

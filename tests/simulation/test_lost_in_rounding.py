@@ -64,9 +64,21 @@ def lever(effects: Callable[[object, object], list]) -> tuple[fm.Simulation, obj
     return fm.Simulation(scene, space="plane-stress", size=2.0, comm=MPI.COMM_SELF), push
 
 
-def test_springs_softer_than_rounding_are_named():
-    simulation, push = lever(lambda hinge, blade: [fm.JointSpring(hinge, 1e-10, rest=0.2)])
-    with pytest.raises(fm.EquilibriumError, match="The springs are softer than the rounding"):
+@pytest.mark.parametrize("stiffness", [1e-10, 1e-14])
+def test_springs_softer_than_rounding_balance_loads_all_the_same(stiffness):
+    load = 1e-3 * stiffness
+    simulation, push = lever(lambda hinge, blade: [fm.JointSpring(hinge, stiffness, rest=0.2)])
+    (frame,) = simulation.load_displacement(push, forces=[load]).frames
+    turn = frame.state.poses[1, 2]
+    assert stiffness * (turn - 0.2) == pytest.approx(30.0 * load * np.cos(turn), rel=1e-6)
+
+
+def test_springs_softer_than_rounding_are_named_where_an_obstacle_is_in_the_way():
+    def effects(hinge, blade) -> list:
+        return [fm.JointSpring(hinge, 1e-10, rest=0.2), fm.Contact(blade, fm.Cylinder((20.0, 5.0), 3.0))]
+
+    simulation, push = lever(effects)
+    with pytest.raises(fm.EquilibriumError, match="softer than the rounding of the stiffest links: make 'blade' rigid"):
         simulation.load_displacement(push, forces=[1e-13])
 
 
