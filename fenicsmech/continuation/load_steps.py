@@ -85,8 +85,8 @@ class LoadSteps:
         failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
             itself. Those before an equilibrium that was reached do not count.
         failures_held: likewise where joints and motors hold the point that is to move.
-        failures_hidden: to one value, in a row or not, after which stepping fails where the rounding of stiff links hides
-            what resists.
+        failures_hidden: to one value, in a row or not, after which stepping fails where the rounding of stiff links
+            hides what resists.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
