@@ -43,7 +43,7 @@ from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestP
 
 _log = logger(__name__)
 _STIFF = 1e-3  # nodal stiffness over the largest, above which rounding of links hides others
-_LOST = 1e-5  # work along motions that deform no link, over loads times the greatest velocity, that leaves rest unknown
+_LOST = 1e-4  # work along motions that deform no link, over loads times the greatest velocity, that leaves rest unknown
 
 
 class CurveStepper:

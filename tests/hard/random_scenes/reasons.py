@@ -160,7 +160,11 @@ def outweighed(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError)
     if "rounding of the stiffest links" not in failure.remedy:
         return None
     named = {link.name for link in blueprint.flexible if repr(link.name) in failure.remedy}
-    share = min(map(_bending, blueprint.flexible)) / max(link.young * link.depth for link in blueprint.flexible)
+    softest = min(blueprint.flexible, key=_bending)
+    stiffest = max(blueprint.flexible, key=lambda link: link.young * link.depth)
+    if stiffest.name not in named or softest.name in named:
+        return None
+    share = _bending(softest) / (stiffest.young * stiffest.depth)
     if share >= THRESHOLDS.outweighed or not _ends_in_equilibria(blueprint.stiffened(named)):
         return None
     reason = "soft links resist less than the rounding of stiff ones"

@@ -84,6 +84,10 @@ EXACT, ROUNDED_TOO = ("equilibrium",), ("equilibrium", ROUNDED)
         pytest.param(19308, EXACT, 2, id="weights and a spring that buckle a linkage find where it snaps to"),
         pytest.param(19089, ROUNDED_TOO, 2, id="rubber moves steel whose rounding leaves four digits of the force"),
         pytest.param(19806, EXACT, None, id="path that turns back where a link comes off a cylinder goes on"),
+        pytest.param(
+            25128, EXACT, 1, id="a spring, weights and a push balance along a motion that rounding of steel hides"
+        ),
+        pytest.param(25033, ROUNDED_TOO, 6, id="path begins at the first force that is felt"),
         pytest.param(18468, EXACT, 2, id="a force balances beside reactions of a prestrained rod 1e5 times as large"),
     ],
 )

@@ -29,6 +29,7 @@ from .reasons import (
     adrift,
     inverted,
     out_of_reach,
+    outweighed,
     overstrained,
     turned_back,
     turned_back_by_motors,
@@ -399,3 +400,21 @@ def test_a_force_is_hidden_only_below_the_rounding_of_one_nodal_force_and_where_
     for before in (loads, motors):
         before.problem = "the motors strain the links, and no equilibrium was found beyond 46.8% of their way"
         assert unheard(turned, build(scene), before) is None
+
+
+@pytest.mark.parametrize(
+    "modulus, remedy, excused",
+    [
+        pytest.param(1e-5, "make 'right' rigid", True, id="the stiff link is named"),
+        pytest.param(1e-1, "make 'right' rigid", False, id="the other one is felt"),
+        pytest.param(1e-5, "make 'left' rigid", False, id="the soft link is named"),
+        pytest.param(1e-5, "give up", False, id="none is named"),
+    ],
+)
+def test_a_soft_link_is_outweighed_by_a_stiff_one_that_the_error_names_and_that_can_be_rigid(modulus, remedy, excused):
+    scene = arch("plane-stress", 2)
+    links = [replace(link, young=young) for link, young in zip(scene.links, (0.0, modulus, 1770.0), strict=True)]
+    scene = replace(scene, links=tuple(links), samples=(1e-4 * modulus,))
+    failure = fm.EquilibriumError("load", "not found", f"Less than the rounding of the stiffest links: {remedy}")
+    excuse = outweighed(scene, build(scene), failure)
+    assert (excuse is not None) == excused
