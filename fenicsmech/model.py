@@ -586,6 +586,14 @@ class MechanismModel:
             self._point_loads[force] = PointLoad(force.name, ((self.point(force), direction),), ((force.on, at),))
         return self._point_loads[force]
 
+    @property
+    def effects_on_rigid_links(self) -> tuple[bool, ...]:
+        """Of the effects with an energy of links, whether links that move as rigid bodies change it."""
+        links = self.mechanism.flexible_links
+        return tuple(
+            bool(effect.one_sided(self.fields)) or not all(map(effect.turns_with, links)) for effect in self._on_links
+        )
+
     def _spins(self, loads: Sequence[PointLoad], touching: Collection[FlexibleLink]) -> tuple[list[Spin], list[Spin]]:
         """The spins that neither loads nor potentials nor effects resist, obstacles may; and those that loads or
         obstacles may resist."""

@@ -25,6 +25,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import repeat
+from typing import Any
 
 import basix
 import numpy as np
@@ -201,14 +203,14 @@ class ElasticBody(BodyFields):
         return [compile_form(ufl.derivative(_sum(terms), field)) for field in concerned]
 
     @cached_property
-    def _effect_load_forms(self) -> list:
-        """The gradients by u of effects' energies that are linear in u, and of the others; None where none is."""
-        dead: list[ufl.Form] = []
-        others: list[ufl.Form] = []
+    def _effect_load_forms(self) -> list[tuple[bool, Any]]:
+        """Of each effect with an energy, whether this is linear in u, and its gradient by u."""
+        found = []
         for term in self._effect_terms:
-            curvature = ufl.derivative(ufl.derivative(term, self.u), self.u)
-            (dead if expand_derivatives(curvature).empty() else others).append(term)
-        return [compile_form(ufl.derivative(_sum(terms), self.u)) if terms else None for terms in (dead, others)]
+            gradient = ufl.derivative(term, self.u)
+            dead = expand_derivatives(ufl.derivative(gradient, self.u)).empty()
+            found.append((dead, compile_form(gradient)))
+        return found
 
     @cached_property
     def _sums(self) -> list[fem.Function]:
@@ -252,16 +254,22 @@ class ElasticBody(BodyFields):
     @property
     def has_other_than_dead_loads(self) -> bool:
         """Whether loads of effects change with u."""
-        return self._effect_load_forms[1] is not None
+        return any(not dead for dead, _ in self._effect_load_forms)
 
-    def effect_loads(self) -> tuple[np.ndarray, np.ndarray]:
+    def effect_loads(self, among: Sequence[bool] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Nodal forces of effects at load factor 1: of dead loads, and of others, which change with u.
 
-        Each of this rank's owned values of u, flat.
+        Args:
+            among: mask of the effects with an energy; by default all of them.
+
+        Returns:
+            Each of this rank's owned values of u, flat.
         """
-        dead, others = self._effect_load_forms
-        none = np.zeros(len(owned_values(self.u)))
-        return none if dead is None else -self.assembled(dead), none if others is None else -self.assembled(others)
+        loads = np.zeros((2, len(owned_values(self.u))))
+        for (dead, form), chosen in zip(self._effect_load_forms, among or repeat(True), strict=False):
+            if chosen:
+                loads[0 if dead else 1] -= self.assembled(form)
+        return loads[0], loads[1]
 
     def create_stiffness(self) -> PETSc.Mat:
         """An empty matrix for ``add_stiffness``: per rank, the owned values of u, then those of p."""

@@ -158,15 +158,17 @@ class Balance:
         return velocity.ravel()
 
     def _effects(self) -> np.ndarray:
-        """Forces of effects at load factor 1 on owned nodes, at the loaded state, (owned displacements,)."""
-        elastic, size = self._model.elastic, self._model.interfaces.owned * self._model.interfaces.block
-        return elastic.load_factor_residuals()[:size] if elastic.depends_on_load_factor else np.zeros(size)
+        """Gradient at load factor 1 of the energies of effects that links as rigid bodies change, at the loaded state,
+        (owned displacements,)."""
+        model, size = self._model, self._model.interfaces.owned * self._model.interfaces.block
+        dead, others = model.elastic.effect_loads(model.effects_on_rigid_links)
+        return -(dead + others)[:size]
 
     def _sizes(self, state: State) -> tuple[float, float]:
         """Sum of the sizes of all loads at the loaded ``state``, those of effects included; the same of what balances.
 
-        Those of effects on a flexible link count by their sum: what balances on each link, as pressure all around it
-        does, works along no motion that deforms none.
+        Those of effects on a flexible link count by their sum: what balances on each link works along no motion that
+        deforms none.
         """
         model, comm, own = self._model, self._comm, self._effects()
         link, links = model.node_link[: model.interfaces.owned], len(model.mechanism.flexible_links)
