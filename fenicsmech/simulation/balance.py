@@ -14,6 +14,7 @@ the moduli of its eigenvalues. From an unstable equilibrium H itself leads to th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -29,6 +30,7 @@ _DIFFERENCE = 1e-4  # rad, or over the mechanism's length, by which links move f
 _LARGEST = 0.1  # likewise in one step
 _ITERATIONS = 10  # to vanishing works
 _FELT = 1e-12  # slope over the largest
+_MOVED = 1e-6  # travel over the mechanism's length, per motion, above which a force works
 _ROUNDS = 4  # of moving links and relaxing them
 
 
@@ -56,6 +58,24 @@ class Balance:
         if left < 0.5 * imbalance and rested.unstable_modes <= point.unstable_modes:
             return rested, left, iterations
         return point, imbalance, iterations
+
+    def with_force(self, point: EquilibriumPoint, control: Control) -> EquilibriumPoint:
+        """The equilibrium at ``point``, of a prescribed displacement, with the force f that balances what acts along
+        motions that deform no link.
+
+            f = a · w / |a|²,     a_i the travel along m_i,     w_i the work of all else,
+
+        in place of one that rounding of stiff links has changed; what converged keeps its own.
+        """
+        if point.residuals[-1] <= self._solver.options.tolerance:
+            return point
+        motions = self._motions(point.state)
+        w, less = (self._works(replace(point.state, force=force), control, motions) for force in (0.0, 1.0))
+        travels = w - less
+        if not np.abs(travels).max(initial=0.0) > _MOVED * self._model.linkage.length:
+            return point
+        force = agreed(self._comm, float(travels @ w / (travels @ travels)))
+        return replace(point, state=replace(point.state, force=force))
 
     def _rested(self, point: EquilibriumPoint, control: Control) -> tuple[EquilibriumPoint, float, int]:
         """The equilibrium to which motions that deform no link lead from ``point``; its imbalance; iterations spent.

@@ -161,9 +161,13 @@ class CurveStepper:
                     raise self._unreached(control, failure) from failure
                 point = found
             imbalance = 0.0
-            if self.freedom.mobility and not control.constrained:
-                point, imbalance, spent = Balance(self._model, self.solver).improved(point, control)
-                self._effort += Effort(spent)
+            if self.freedom.mobility:
+                balance = Balance(self._model, self.solver)
+                if control.constrained:
+                    point = balance.with_force(point, control)
+                else:
+                    point, imbalance, spent = balance.improved(point, control)
+                    self._effort += Effort(spent)
             record = self.record(point)
             if imbalance > _LOST:
                 names = ", ".join(map(repr, self.freedom.mobile))

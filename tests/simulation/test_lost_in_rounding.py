@@ -1,4 +1,4 @@
-"""Loads far below the rounding of stiff links turn what nothing else holds, unless they cannot be followed."""
+"""Loads and springs far below the rounding of stiff links balance, unless obstacles are in the way."""
 
 from collections.abc import Callable
 
@@ -68,6 +68,14 @@ def test_springs_softer_than_rounding_balance_loads_all_the_same(stiffness):
     (frame,) = simulation.load_displacement(push, forces=[load]).frames
     turn = frame.state.poses[1, 2]
     assert stiffness * (turn - 0.2) == pytest.approx(30.0 * load * np.cos(turn), rel=1e-6)
+
+
+@pytest.mark.parametrize("stiffness", [1e-10, 1e-14])
+def test_a_prescribed_displacement_gives_the_force_of_a_spring_softer_than_rounding(stiffness):
+    simulation, push = lever(lambda hinge, blade: [fm.JointSpring(hinge, stiffness, rest=0.2)])
+    (frame,) = simulation.load_displacement(push, displacements=[3.0]).frames
+    turn = np.arcsin(0.1)
+    assert frame.force * 30.0 * np.cos(turn) == pytest.approx(stiffness * (turn - 0.2), rel=1e-9)
 
 
 def test_springs_softer_than_rounding_are_named_where_an_obstacle_is_in_the_way():
