@@ -17,6 +17,7 @@ from .blueprint import Blueprint, Built, build
 from .draw import bending_force, decade
 from .generator import planar_scene
 from .potential import Potential
+from .reasons import snaps
 from .residual_check import energy_digits
 from .thresholds import THRESHOLDS
 
@@ -126,10 +127,20 @@ def _optimised(scene: DesignScene) -> tuple[str, str]:
         if _idle(scene, frame.displacement):
             return "true: DescriptionError, the links do not carry the force", str(error)
         raise
+    except fm.EquilibriumError as error:
+        if "snaps on the way there from zero load" in error.problem and (excuse := snaps(scene.blueprint, built)):
+            return "true: EquilibriumError, the drawn mechanism snaps", f"{excuse.proof}; {error}"
+        raise
     if (misreport := _misreported(scene, built, result, frame.displacement)) is not None:
         return misreport
     if _met(result):
         return "designed: targets met", result.reason
+    if "allow more" in result.reason:  # as the result says
+        result = problem.optimise(start=result)
+        if (misreport := _misreported(scene, built, result, frame.displacement)) is not None:
+            return misreport
+        if _met(result):
+            return "designed: targets met by more iterations", result.reason
     # an independent start, from shapes that differ by what the bounds allow
     rng, initial = np.random.default_rng(scene.start), problem.initial
     other = problem.optimise(start=initial + _spread(scene) * rng.uniform(-1.0, 1.0, initial.shape))

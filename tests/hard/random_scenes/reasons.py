@@ -287,6 +287,13 @@ def turned_back(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError
     return _turn(frames, shares, reached, lambda k: _proven(blueprint, built, frames[k]))
 
 
+def snaps(blueprint: Blueprint, built: Built) -> Excuse | None:
+    """The path followed from rest, through equilibria that pass the checks, turns back before the first load."""
+    (asked, *_) = blueprint.samples
+    frames = _frames(lambda: built.follow(blueprint, fm.Until(force=asked, frames=THRESHOLDS.followed), _LONG))
+    return _turn(frames, [frame.force / asked for frame in frames], 1.0, lambda k: _proven(blueprint, built, frames[k]))
+
+
 def turned_back_by_motors(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError) -> Excuse | None:
     """The same of the path along which motors take a mechanism from the drawing, where nothing else acts."""
     ways = [motor for motor in blueprint.motors if motor.position]
