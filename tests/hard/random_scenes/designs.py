@@ -109,13 +109,18 @@ def run(scene: DesignScene) -> tuple[str, str]:
     except fm.FenicsmechError as error:
         if "Use smaller elements" not in str(error):
             raise
-        links = tuple(replace(link, size=0.5 * link.size) for link in scene.blueprint.links)
-        _optimised(replace(scene, blueprint=replace(scene.blueprint, links=links)))
+        _optimised(_refined(scene))
         return "refused: elements too large for handles, smaller ones are not", str(error)
 
 
-def _optimised(scene: DesignScene) -> tuple[str, str]:
-    """Outcome and detail."""
+def _refined(scene: DesignScene) -> DesignScene:
+    """The same problem on elements half as large."""
+    links = tuple(replace(link, size=0.5 * link.size) for link in scene.blueprint.links)
+    return replace(scene, blueprint=replace(scene.blueprint, links=links))
+
+
+def _optimised(scene: DesignScene, *, refine: bool = True) -> tuple[str, str]:
+    """Outcome and detail; where targets are missed and the result asks for smaller elements, those on these."""
     built = build(scene.blueprint)
     (frame,) = built.curve(scene.blueprint).frames
     if abs(frame.displacement) < THRESHOLDS.closed * scene.blueprint.length:
@@ -141,6 +146,10 @@ def _optimised(scene: DesignScene) -> tuple[str, str]:
             return misreport
         if _met(result):
             return "designed: targets met by more iterations", result.reason
+    if refine and "refine them" in result.reason:
+        outcome, detail = _optimised(_refined(scene), refine=False)
+        met = outcome.startswith("designed: targets met")
+        return ("designed: targets met on smaller elements" if met else outcome), detail
     # an independent start, from shapes that differ by what the bounds allow
     rng, initial = np.random.default_rng(scene.start), problem.initial
     other = problem.optimise(start=initial + _spread(scene) * rng.uniform(-1.0, 1.0, initial.shape))

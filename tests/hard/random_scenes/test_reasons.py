@@ -304,6 +304,8 @@ def test_constant_forces_alone_are_followed():
         ("", (True, 1.0, 1.0), (True, 1.0, 1.1), "designed: targets met"),
         ("allow more", (False, 1.0, 1.0), (True, 1.0, 1.0), "designed: targets met by more iterations"),
         ("allow more", (False, 1.0, 1.0), (True, 1.0, 1.1), "wrong: displacement of a design"),
+        ("refine them", (False, 1.0, 1.0), (True, 1.0, 1.0), "designed: targets met on smaller elements"),
+        ("refine them", (False, 1.0, 1.0), (True, 1.0, 1.1), "wrong: displacement of a design"),
     ],
 )
 def test_results_of_either_start_are_wrong_where_a_curve_differs(reason, first, second, outcome, monkeypatch):
