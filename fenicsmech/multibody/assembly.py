@@ -339,8 +339,9 @@ class Motion:
         return float(max(np.max(np.linalg.norm(self.velocity, axis=1)), np.max(spins)))
 
 
-def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> list[Motion]:
-    """A basis of the motions that keep joints closed at ``poses`` (bodies, pose_size) and deform no link.
+def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray, rows: np.ndarray) -> list[Motion]:
+    """A basis of the motions that leave constraint ``rows`` as they are at ``poses`` (bodies, pose_size) and deform no
+    link.
 
     Velocities are of the order of the mechanism's length or below, spins of the order of one.
     """
@@ -359,7 +360,7 @@ def stiff_motions(linkage: Linkage, poses: np.ndarray, motors: np.ndarray) -> li
                 z[joints.columns[body]] = np.concatenate([velocity[body], space.rotation_rates(poses[body]) @ turn])
             basis.append((z, velocity, spin))
     parts = [np.array(part) for part in zip(*basis, strict=True)]
-    rates = joints.row_scale[:, None] * (joints.gradient(poses, motors) @ parts[0].T)
+    rates = (joints.row_scale[:, None] * (joints.gradient(poses, motors) @ parts[0].T))[rows]
     return [Motion(*(np.tensordot(weights, part, 1) for part in parts)) for weights in _null_space(rates)]
 
 

@@ -7,8 +7,9 @@ position out of balance, all links move along such motions m alone to where the 
 
     q ← q − |H|⁻¹ w,     w_i = ∇(V + E_effects − loads) · m_i,     H = ∂w/∂q,
 
-H by differences, along those motions of the moved links that are nearest to the ones before; |H|, which descends, has
-the moduli of its eigenvalues. From an unstable equilibrium H itself leads to the one near.
+V the potentials of poses and of joints that give way, H by differences, along those motions of the moved links that are
+nearest to the ones before; |H|, which descends, has the moduli of its eigenvalues. From an unstable equilibrium H leads
+to the one near.
 """
 
 from __future__ import annotations
@@ -125,17 +126,23 @@ class Balance:
         return (nearest @ self._works(there, control, moved) - works) / _DIFFERENCE
 
     def _motions(self, state: State) -> list[Motion]:
-        """Those that deform no link, on all processes the same basis."""
-        return from_one(self._comm, lambda: stiff_motions(self._model.linkage, state.poses, state.motors))
+        """Those that deform no link and open no joint but one that gives way, on all processes the same basis."""
+        rows = self._solver.system.rigid_rows
+        return from_one(self._comm, lambda: stiff_motions(self._model.linkage, state.poses, state.motors, rows))
 
     def _moved(self, state: State, motions: Sequence[Motion], q: np.ndarray) -> State:
-        """``state`` after all links have turned along ``motions``, by q (motions,)."""
+        """``state`` after all links have turned along ``motions``, by q (motions,); joints that give way have
+        λ = −C / c."""
         u, z = np.zeros(len(state.u)), np.zeros(self._solver.system.joints.size)
         for motion, way in zip(motions, q, strict=True):
             velocity = self._velocity(state, motion)
             u[: len(velocity)] += way * velocity
             z += way * motion.z
-        return self._solver.system.turned(state, Step(u, z, np.zeros(len(state.multipliers)), 0.0))
+        system, multipliers = self._solver.system, state.multipliers.copy()
+        moved = system.turned(state, Step(u, z, np.zeros(len(multipliers)), 0.0))
+        soft = np.flatnonzero(system.compliances)
+        multipliers[soft] = -system.joints.value(moved.poses, moved.motors)[soft] / system.compliances[soft]
+        return replace(moved, multipliers=multipliers)
 
     def imbalance(self, state: State, control: Control) -> float:
         """Largest work of a loaded equilibrium along motions that deform no link, over loads times greatest velocity.

@@ -31,10 +31,14 @@ def test_the_motion_of_a_slider_crank_is_the_rate_of_its_assembly(dim):
     here, step = poses(-9.0), 1e-4
     rate = linkage.joints.unknowns(poses(-9.0 + step) - poses(-9.0 - step)) / (2.0 * step)
     free = build_linkage(slider_crank()[0], dim)
-    (motion,) = stiff_motions(free, here, np.zeros(4))
+    (motion,) = stiff_motions(free, here, np.zeros(4), np.arange(free.joints.rows))
     amplitude = (motion.z @ rate) / (rate @ rate)
     assert motion.z == pytest.approx(amplitude * rate, abs=1e-7 * np.abs(motion.z).max())
     first, second = free.interfaces[driven.flexible_links[0]]
     apart = here[second, :dim] - here[first, :dim] + np.array([50.0, -20.0, 0.0])[:dim]
     assert motion.velocity[second] == pytest.approx(motion.at(first, apart[None])[0])
-    assert stiff_motions(linkage, here, linkage.joints.motor_values(lambda motor: -9.0)) == []
+    held = linkage.joints.motor_values(lambda motor: -9.0)
+    assert stiff_motions(linkage, here, held, np.arange(linkage.joints.rows)) == []
+    # without its pin, the slider moves beside the crank and the rod
+    pin = np.array([name.startswith(driven.joints[2].name) for name in free.joints.row_names])
+    assert len(stiff_motions(free, here, np.zeros(4), np.flatnonzero(~pin))) == 3

@@ -70,6 +70,19 @@ def test_springs_softer_than_rounding_balance_loads_all_the_same(stiffness):
     assert stiffness * (turn - 0.2) == pytest.approx(30.0 * load * np.cos(turn), rel=1e-6)
 
 
+def test_a_pin_softer_than_rounding_gives_way_to_a_load_as_its_compliance_says():
+    load, stiffness, compliance = 1e-9, 1e-6, 1e7
+
+    def effects(hinge, blade) -> list:
+        return [fm.JointSpring(hinge, stiffness, rest=0.0), fm.JointCompliance(hinge, compliance)]
+
+    simulation, push = lever(effects)
+    (frame,) = simulation.load_displacement(push, forces=[load]).frames
+    turn = frame.state.poses[1, 2]
+    assert stiffness * turn == pytest.approx(30.0 * load * np.cos(turn), rel=1e-6)
+    assert frame.displacement == pytest.approx(compliance * load + 30.0 * np.sin(turn), rel=1e-6)
+
+
 @pytest.mark.parametrize("stiffness", [1e-10, 1e-14])
 def test_a_prescribed_displacement_gives_the_force_of_a_spring_softer_than_rounding(stiffness):
     simulation, push = lever(lambda hinge, blade: [fm.JointSpring(hinge, stiffness, rest=0.2)])
