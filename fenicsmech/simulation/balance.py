@@ -91,8 +91,11 @@ class Balance:
             residual = system.residual(state, control)
             try:
                 if residual.norm <= solver.rounding(residual):
-                    point = solver.linearise(state, control, residual).point(point.residuals, point.iterations)
-                    return point, self.imbalance(state, control), iterations
+                    at = solver.linearise(state, control, residual)
+                    hidden = at.drowns_modes  # as is then the stability
+                    found = at.point(point.residuals, point.iterations)
+                    found = replace(found, stability=point.stability) if hidden else found
+                    return found, self.imbalance(state, control), iterations
                 point = solver.solve(state, control)
             except NotConverged as failure:
                 return point, imbalance, iterations + failure.iterations
