@@ -80,7 +80,7 @@ class LoadSteps:
     """Options of load steps; motions are in lengths of the mechanism, or rad.
 
     Attributes:
-        smallest: smallest step, over the distance to the end, or the distance covered if that is less.
+        smallest: smallest step, over the distance to the end, or that from the start if it is less.
         motion: largest motion of a step along the tangent (measured).
         failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
             itself. Those before an equilibrium that was reached do not count.
@@ -225,7 +225,7 @@ class LoadStepper(Stepper):
         self._steps, self._plain = steps or LoadSteps(), solver
         self._shifts = shifts or self._steps.least_shifts(start.minimum_shift)
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
-        self._origin, self._covered = self._value, 0.0  # farthest from there so far
+        self._origin, self._covered = self._value, 0.0  # from there to the last equilibrium
         self._rate: Step | None = None  # of the last step, by the control value
         self.iterations = self.snaps = 0
 
@@ -395,7 +395,7 @@ class LoadStepper(Stepper):
         return limited if abs(limited) > self._steps.smallest_limited * abs(distance) else step
 
     def _scale(self, distance: float) -> float:
-        """Reference length of steps: the distance covered so far, at first the first step, whatever the end.
+        """Reference length of steps: the distance from the start, there the first step, whatever the end.
 
         So a prescribed load a thousand times the limit load locates it as closely as one just beyond it. To a value
         that is the first one but for rounding nothing is covered: no step is as small.
@@ -439,7 +439,7 @@ class LoadStepper(Stepper):
         """Keeps ``point``, at the value of its control."""
         self._accept(point, point.control.prescribed - self._value)
         self._value = point.control.prescribed
-        self._covered = max(self._covered, abs(self._value - self._origin))
+        self._covered = abs(self._value - self._origin)
 
 
 class DeadCentreStepper(LoadStepper):
