@@ -225,7 +225,7 @@ class LoadStepper(Stepper):
         self._steps, self._plain = steps or LoadSteps(), solver
         self._shifts = shifts or self._steps.least_shifts(start.minimum_shift)
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
-        self._origin, self._covered = self._value, 0.0  # from there to the last equilibrium
+        self._origin = self._value
         self._rate: Step | None = None  # of the last step, by the control value
         self.iterations = self.snaps = 0
 
@@ -400,8 +400,10 @@ class LoadStepper(Stepper):
         So a prescribed load a thousand times the limit load locates it as closely as one just beyond it. To a value
         that is the first one but for rounding nothing is covered: no step is as small.
         """
-        covered = self._covered if self._covered > 0.5**self._steps.failures * abs(distance) else 0.0
-        return min(abs(distance), covered or abs(self._limited(distance, distance)))
+        covered = abs(self._value - self._origin)
+        if covered <= 0.5**self._steps.failures * abs(distance):
+            covered = abs(self._limited(distance, distance))
+        return min(abs(distance), covered)
 
     def _snapped(self, point: EquilibriumPoint) -> bool:
         """Whether the rate of the step to ``point`` lies outside the range of the tangents at its ends.
@@ -439,7 +441,6 @@ class LoadStepper(Stepper):
         """Keeps ``point``, at the value of its control."""
         self._accept(point, point.control.prescribed - self._value)
         self._value = point.control.prescribed
-        self._covered = abs(self._value - self._origin)
 
 
 class DeadCentreStepper(LoadStepper):
