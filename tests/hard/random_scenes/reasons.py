@@ -17,6 +17,7 @@ import fenicsmech as fm
 from .assembly_check import smallest_gap
 from .blueprint import Blueprint, Built, CompliancePlan, ContactPlan, GravityPlan, LinkPlan, SpringPlan, build
 from .closure import Place
+from .draw import length
 from .motions import STEP, body_modes, moved
 from .potential import Potential
 from .reach import beyond_chains, least_stretch
@@ -173,9 +174,8 @@ def outweighed(blueprint: Blueprint, built: Built, failure: fm.EquilibriumError)
 
 def _bending(link: LinkPlan) -> float:
     """3 E I / l³ of a link about the axis along which it is thinner, N/mm."""
-    length = float(np.linalg.norm(np.diff(link.centreline, axis=0), axis=1).sum())
     thin, wide = sorted((link.thickness, link.depth))
-    return link.young * wide * thin**3 / (4.0 * length**3)
+    return link.young * wide * thin**3 / (4.0 * length(link) ** 3)
 
 
 def _ends_in_equilibria(blueprint: Blueprint) -> bool:
