@@ -18,7 +18,8 @@ the same on all processes and machines, and not by time:
     2. shifts of the KKT matrix until steps descend            ``PrimalDualNewton.shifts`` an iteration
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
-    5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each
+    5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each, or two that
+                                                               fail alike
     6. steps that turn links (``equilibrium.turning``), 1 to   as these; the kind that led to the last equilibrium
        5, or those that do not                                 comes first
     7. half the step                                           ``LoadSteps.smallest``, ``smallest_snap_step`` once an
@@ -337,21 +338,28 @@ class LoadStepper(Stepper):
             raise
 
     def _shifted(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there."""
+        """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there.
+
+        Two that fail alike show that shifts make no difference.
+        """
         at_start = control.prescribed == self._origin
         shifts = self._shifts.at_start if at_start else self._shifts.elsewhere
+        failed: tuple[str, int] | None = None
         for place, shift in enumerate(shifts):
             try:
                 point = self.solver.solve(replace(guess, minimum_shift=shift), control)
             except NotConverged as failure:
                 self.iterations += failure.iterations
-                reason = failure.reason
+                before, failed = failed, (failure.reason, failure.iterations)
+                if failed == before:
+                    break
                 continue
             self.iterations += point.iterations
             left = {"at_start" if at_start else "elsewhere": shifts[place:]}  # the others would fail again
             self._shifts = replace(self._shifts, **left)
             return point
-        raise NotConverged(reason)
+        assert failed is not None, "there is a shift"
+        raise NotConverged(*failed)
 
     def _guess(self, control: Control) -> State:
         """The prediction; the last equilibrium where the prediction runs into obstacles, or comes off them."""

@@ -33,11 +33,12 @@ class Stubborn(OneFreedom):
 
     Args:
         longest: step that succeeds.
+        alike: whether solves fail in the same way whatever the least shift.
     """
 
-    def __init__(self, longest: float) -> None:
+    def __init__(self, longest: float, *, alike: bool = False) -> None:
         super().__init__()
-        self.longest, self.reached = longest, 0.0
+        self.longest, self.alike, self.reached = longest, alike, 0.0
         self.tried: list[tuple[float, float]] = []  # prescribed value and least shift of each solve
         self.failed = 0
 
@@ -48,7 +49,7 @@ class Stubborn(OneFreedom):
         self.tried.append((control.prescribed, start.minimum_shift))
         if abs(control.prescribed - self.reached) > self.longest:
             self.failed += 1
-            raise NotConverged("too far", 25)
+            raise NotConverged("too far" + f" with a shift of {start.minimum_shift:g}" * (not self.alike), 25)
         self.reached = control.prescribed
         tangent = Step(np.ones(1), np.zeros(0), np.zeros(0), 1.0)
         state = State(np.array([self.reached]), np.zeros((0, 1)), np.zeros(0), self.reached, np.zeros(0))
@@ -73,6 +74,14 @@ def test_smaller_shifts_come_before_half_the_step():
     values = np.array([value for value, _ in rest[::3]])
     assert values == pytest.approx(0.1 * 0.5 ** np.arange(len(values)))
     assert failure.value.tried == tuple(values) and failure.value.reached == 0.0
+
+
+def test_where_two_shifts_fail_alike_half_the_step_comes_before_the_third():
+    path, shift = Stubborn(0.0, alike=True), LoadSteps().minimum_shift
+    with pytest.raises(LoadStepsFailed) as failure:
+        stepper(path, minimum_shift=shift).advance(LoadControl(0.1))
+    assert [tried for _, tried in path.tried[1:]] == [shift, 1e-3 * shift] * len(failure.value.tried)
+    assert failure.value.reason == "too far"
 
 
 def test_shifts_where_loads_resist_are_the_smallest_first_away_from_the_start_and_stay_so_after_failures():

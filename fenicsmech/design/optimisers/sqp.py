@@ -14,10 +14,12 @@ truth Σ r_k H_k outweighs R. Convergence is judged by the undamped step without
 
 A step is accepted if it lowers the merit O + Σ ν_k β(c_k) by a part of the predicted reduction; μ falls after good
 steps and grows after bad or infeasible ones. An end by short steps is a minimum only if no infeasible ones made them
-short. The penalties ν exceed the multipliers λ of the undamped step, follow them
-slowly where they fall, and grow where that step leaves inequalities violated: the method is Fletcher's Sℓ₁QP (Practical
-Methods of Optimization, doi:10.1002/9781118723203, section 14.4) with Levenberg's damping in place of a trust region
-and Powell's rule for ν (Nocedal & Wright, Numerical Optimization, doi:10.1007/978-0-387-40065-5, chapter 18).
+short. O jumps where equilibria snap as the shape changes: where steps end short of what derivatives promise, descents
+are tried from where the undamped step leads, and from half way. The penalties ν exceed the multipliers λ of that step,
+follow them slowly where they fall, and grow where it leaves inequalities violated: the method is Fletcher's Sℓ₁QP
+(Practical Methods of Optimization, doi:10.1002/9781118723203, section 14.4) with Levenberg's damping in place of a
+trust region and Powell's rule for ν (Nocedal & Wright, Numerical Optimization, doi:10.1007/978-0-387-40065-5, chapter
+18).
 
 Libraries' methods (SLSQP, MMA, CCSA, trust-constr) see O as one function: they do not use residuals, take the barriers
 of R for curvature, and end or diverge at infeasible points. ``python3 -m benchmarks.constrained`` compares them on
@@ -26,7 +28,7 @@ formulas: SLSQP needs about as many evaluations, the others two to five times as
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,7 +102,7 @@ class SQP(Optimiser):
         flat: change of the residuals by the lengths of all parameters, over the residuals, below which a stationary
             point may be a saddle, as a straight link's that may bend to either side.
         aside: largest change of a parameter, over its length, to a point beside such a saddle.
-        tries: descents from points beside it, at most.
+        tries: descents from points beside it, or beyond a jump of O, at most.
         violation: largest value of an inequality that counts as satisfied.
         damping: μ at the start, over the change of O when parameters change by their lengths.
         least_damping: least μ, which keeps parameters without influence in place.
@@ -146,27 +148,33 @@ class SQP(Optimiser):
     def minimise(self, problem: Problem, start: Start, *, watch: Callable[[Iterate], None]) -> Iterate:
         last = self._descent(problem, start, watch)
         if self._may_be_saddle(last, problem.lengths):
-            last = self._from_beside(problem, last, watch)
+            # the same directions every time
+            ways = np.random.default_rng(0).uniform(-self.aside, self.aside, (self.tries, len(problem.lengths)))
+            last = self._from_elsewhere(problem, last, ways * problem.lengths, watch)
+        elif self._may_be_before_jump(last):
+            memory = Memory.unpacked(last.memory, last.evaluation)
+            step, _ = self._undamped(last.evaluation, memory, problem.lengths)
+            away = step.parameters - last.evaluation.parameters
+            last = self._from_elsewhere(problem, last, [away / 2**k for k in range(self.tries)], watch)
         watch(last)
         return last
 
-    def _from_beside(self, problem: Problem, saddle: Iterate, watch: Callable[[Iterate], None]) -> Iterate:
-        """The first lower end of descents from points beside a ``saddle``; that itself if there is none."""
-        # the same directions every time
-        ways = np.random.default_rng(0).uniform(-self.aside, self.aside, (self.tries, len(problem.lengths)))
-        number, evaluations = saddle.number, saddle.evaluations
+    def _from_elsewhere(
+        self, problem: Problem, end: Iterate, ways: Iterable[np.ndarray], watch: Callable[[Iterate], None]
+    ) -> Iterate:
+        """The first lower end of descents from points some ``ways``, (n,), from an ``end``; that itself if none is."""
+        number, evaluations = end.number, end.evaluations
         for way in ways:
-            beside = saddle.evaluation.parameters + way * problem.lengths
             try:
-                end = self._descent(problem, Start(beside, number, evaluations), watch)
+                found = self._descent(problem, Start(end.evaluation.parameters + way, number, evaluations), watch)
             except Infeasible:
                 evaluations += 1
                 continue
-            if end.evaluation.value < saddle.evaluation.value:
-                return end
-            number, evaluations = end.number, end.evaluations
-        problem.evaluate(saddle.evaluation.parameters)
-        return replace(saddle, number=number, evaluations=evaluations + 1)
+            if found.evaluation.value < end.evaluation.value:
+                return found
+            number, evaluations = found.number, found.evaluations
+        problem.evaluate(end.evaluation.parameters)
+        return replace(end, number=number, evaluations=evaluations + 1)
 
     def _descent(self, problem: Problem, start: Start, watch: Callable[[Iterate], None]) -> Iterate:
         """The end of a descent; ``watch`` is called with all iterates before."""
@@ -190,6 +198,10 @@ class SQP(Optimiser):
         here = last.evaluation
         r, most = float(np.linalg.norm(here.residuals)), float(np.linalg.norm(here.jacobian * lengths))
         return last.reason is Reason.CONVERGED and r**2 > here.value and most < self.flat * r
+
+    def _may_be_before_jump(self, last: Iterate) -> bool:
+        """Whether an end is one at which steps no longer gain what derivatives promise, as before a jump of O."""
+        return last.reason in (Reason.CONVERGED, Reason.NO_DESCENT) and last.reduction > self.least_reduction
 
     def _begin(self, here: Evaluation, lengths: np.ndarray) -> Memory:
         """Memory at the start: O changes by the scale, and f's gradient by itself, when p changes by its lengths."""

@@ -100,6 +100,19 @@ class Ridge(Problem):
         return np.array([0.1 + self.sign * x * x]), np.array([[2.0 * self.sign * x, 0.0]])
 
 
+class Jump(Problem):
+    """r = (x − 1, 0), which jumps at x = 0.4 to (x − 1.9, ``floor``), as a part that snaps when its shape changes."""
+
+    def __init__(self, floor: float) -> None:
+        self.floor = floor
+        super().__init__(np.zeros(1), np.ones(1))
+
+    def residuals(self, parameters):
+        beyond = parameters[0] > 0.4
+        root, rest = (1.9, self.floor) if beyond else (1.0, 0.0)
+        return np.array([parameters[0] - root, rest]), np.array([[1.0], [0.0]])
+
+
 class Wall(Problem):
     """r = x − 10, and a steep barrier from x = 1 on, which costs 1e5 times the residual where the residual vanishes.
 
@@ -260,6 +273,24 @@ def test_a_minimum_where_residuals_depend_on_nothing_is_returned_to():
     assert np.array_equal(problem.asked[-1], problem.start) and last.evaluations == len(problem.asked)
 
 
+@pytest.mark.parametrize("optimiser", [LevenbergMarquardt(), LevenbergMarquardt(tolerance=0.05), SQP()])
+def test_a_jump_of_the_objective_is_crossed_where_what_is_beyond_falls_lower(optimiser):
+    problem = Jump(0.0)
+    last, history = watched(optimiser, problem)
+    assert last.evaluation.parameters == pytest.approx([1.9], abs=0.05)
+    numbers = [iterate.number for iterate in history]
+    assert numbers == sorted(numbers) and [own.reason for own in history[:-1]] == [None] * (len(history) - 1)
+    assert last.evaluations == len(problem.asked)
+
+
+def test_an_end_before_a_jump_is_returned_to_where_nothing_beyond_is_lower():
+    problem = Jump(1.0)
+    last, _ = watched(LevenbergMarquardt(), problem)
+    assert last.reason is not None and last.evaluation.parameters == pytest.approx([0.4], abs=0.05)
+    assert last.evaluation.parameters[0] <= 0.4 and last.evaluations == len(problem.asked)
+    assert np.array_equal(problem.asked[-1], last.evaluation.parameters)
+
+
 def test_least_squares_structure_pays():
     fast, slow = (watched(m, Rosenbrock())[0].evaluations for m in OPTIMISERS)
     assert fast < slow
@@ -356,7 +387,7 @@ def test_resuming_from_any_iterate_repeats_the_uninterrupted_run(optimiser):
 
 def test_three_steps_that_gain_next_to_nothing_are_enough():
     # damping so strong that a step gains little although the predicted reduction is large
-    crawling = LevenbergMarquardt(tolerance=1e-3, damping=1e9)
+    crawling = LevenbergMarquardt(tolerance=1e-3, damping=1e9, tries=0)
     last, history = watched(crawling, Rosenbrock())
     assert last.reason is Reason.CONVERGED
     assert last.reduction > crawling.tolerance

@@ -319,15 +319,18 @@ class Potential:
         return sum(self._weight(plan, ones * _unit(plan, self.mesh.dim)) for plan in plans)
 
     def _weight(self, plan: GravityPlan, u: np.ndarray) -> complex:
+        g = np.array((*plan.acceleration, 0.0)[: self.mesh.dim])
+        return plan.density * np.sum(self._shares[..., None] * u[self.mesh.cells] * g)
+
+    @cached_property
+    def _shares(self) -> np.ndarray:
+        """b ∫ N_k dX of the functions N_k of all cells, (m, k)."""
         # u of the mesh's order times the volume of a curved cell: exact
         points, weights = quadrature(self.mesh.dim, self.mesh.order + self.mesh.dim * (self.mesh.order - 1))
-        N = self.mesh.elements.values(points)
-        sums = np.einsum("mq,q,qk,mki->mi", self.mesh.volumes(points), weights, N, u[self.mesh.cells])
-        g = np.array((*plan.acceleration, 0.0)[: self.mesh.dim])
         depth = np.ones(len(self.mesh.cells))
         for link, row in self.rows.items():
             depth[self.mesh.link == row] = self.factor(self.blueprint.link(link))
-        return plan.density * np.sum(depth[:, None] * sums * g)
+        return depth[:, None] * ((self.mesh.volumes(points) * weights) @ self.mesh.elements.values(points))
 
     @cached_property
     def _names(self) -> list[str]:
