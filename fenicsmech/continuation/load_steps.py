@@ -1,7 +1,8 @@
 """Load steps (natural continuation): from a known equilibrium to the wanted value of a control.
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
-when it took few iterations; the tangent bounds their motion; equilibria reached are kept. Stepping fails once steps are
+when it took few iterations, but pass no value that failed before that is tried again from near, or bisected where the
+path turns back before it; the tangent bounds their motion; equilibria reached are kept. Stepping fails once steps are
 small relative to the distance covered, however far the prescribed value: the softest stiffness falls as √(1 − p / p*)
 towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5 % of it. A step that
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
@@ -13,8 +14,8 @@ Where an equilibrium is not found at once, fallbacks follow in this order. All o
 the same on all processes and machines, and not by time:
 
     fallback                                                   ends after
-    1. the tangent's prediction, then the last equilibrium,    one each; where other points touch, the latter at once
-       where a prediction moves too far
+    1. the tangent's prediction, then the last equilibrium,    one each; where other points touch, or elements are
+       where a prediction moves too far                        inverted in a prediction, the latter at once
     2. shifts of the KKT matrix until steps descend            ``PrimalDualNewton.shifts`` an iteration
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
@@ -69,7 +70,15 @@ from dataclasses import dataclass, replace
 
 from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
-from fenicsmech.equilibrium import Control, EquilibriumPoint, EquilibriumSolver, NotConverged, State, Step
+from fenicsmech.equilibrium import (
+    Control,
+    EquilibriumPoint,
+    EquilibriumSolver,
+    InvertedGuess,
+    NotConverged,
+    State,
+    Step,
+)
 from fenicsmech.errors import not_negative, set_fields, set_options
 from fenicsmech.log import logger
 
@@ -241,6 +250,7 @@ class LoadStepper(Stepper):
             self._settle(control.at(self._value))
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
+        nearest: float | None = None  # ahead, of those tried
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
         # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
         aside, halved = dict[float, EquilibriumPoint](), False
@@ -259,7 +269,7 @@ class LoadStepper(Stepper):
                     continue
             except NotConverged as failure:
                 tried.append(value)
-                failed, halved = failed + 1, True
+                nearest, failed, halved = value, failed + 1, True
                 step = 0.5 * (value - self._value)
                 smallest = steps.smallest if beyond is None else steps.smallest_snap_step
                 ended = abs(step) <= smallest * self._scale(distance) or failed >= steps.failures
@@ -291,6 +301,16 @@ class LoadStepper(Stepper):
                 step = control.prescribed - self._value
             elif point.iterations <= steps.iterations:
                 step *= 2.0
+            step = self._up_to(nearest, step, distance)
+
+    def _up_to(self, nearest: float | None, step: float, distance: float) -> float:
+        """``step``, at most to the ``nearest`` value where none was found: from near, it is tried again before what is
+        farther; half way to it where the path turns back before it, unless that is a smallest step."""
+        if nearest is None or (nearest - self._value) * step <= 0.0:
+            return step
+        left = nearest - self._value
+        halved = abs(left) > 2.0 * self._steps.smallest * self._scale(distance) and self._fold(nearest) is not None
+        return min(step, 0.5 * left if halved else left, key=abs)
 
     @property
     def _last(self) -> EquilibriumPoint | None:
@@ -323,9 +343,16 @@ class LoadStepper(Stepper):
             pass
 
     def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind."""
+        """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind.
+
+        If elements are inverted in it, steps begin at the last equilibrium.
+        """
         try:
             return self._shifted(guess, control)
+        except InvertedGuess:
+            if not self._points or guess is self._points[-1].state:
+                raise
+            return self._correct(self._points[-1].state, control)
         except NotConverged:
             other = self.solver.turning or self._plain
             if other is self.solver:
@@ -348,6 +375,8 @@ class LoadStepper(Stepper):
         for place, shift in enumerate(shifts):
             try:
                 point = self.solver.solve(replace(guess, minimum_shift=shift), control)
+            except InvertedGuess:
+                raise
             except NotConverged as failure:
                 self.iterations += failure.iterations
                 before, failed = failed, (failure.reason, failure.iterations)

@@ -34,6 +34,7 @@ from fenicsmech.equilibrium.linearisation import (
     Direct,
     EquilibriumPoint,
     Factor,
+    InvertedGuess,
     Linearisation,
     LinearMethod,
     LinearSolver,

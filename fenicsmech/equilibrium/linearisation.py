@@ -204,6 +204,13 @@ class NotConverged(Exception):
         self.reason, self.iterations = reason, iterations
 
 
+class InvertedGuess(NotConverged):
+    """Elements are inverted in the first guess of an equilibrium."""
+
+    def __init__(self) -> None:
+        super().__init__("elements are inverted in the predicted state")
+
+
 @dataclass(frozen=True, eq=False)
 class EquilibriumPoint:
     """A converged equilibrium.

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from fenicsmech.equilibrium.control import ArcLengthControl, Control, PathPlane
 from fenicsmech.equilibrium.linearisation import (
     EquilibriumPoint,
+    InvertedGuess,
     Linearisation,
     LinearMethod,
     LinearSolver,
@@ -93,12 +94,13 @@ class EquilibriumSolver(ABC):
             control: the prescribed value.
 
         Raises:
+            InvertedGuess: elements are inverted in it.
             NotConverged: too many iterations, no descent, or elements inverted all along.
         """
         start = control.prepare(start)
         self.system.load(start)
         if not math.isfinite(self.system.elastic_energy()):
-            raise NotConverged("elements are inverted in the predicted state")
+            raise InvertedGuess
         return self.iterate(start, control)
 
     @abstractmethod

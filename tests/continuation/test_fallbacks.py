@@ -16,6 +16,7 @@ from fenicsmech.effects import JointSpring
 from fenicsmech.equilibrium import (
     EquilibriumPoint,
     EquilibriumSolver,
+    InvertedGuess,
     LoadControl,
     NotConverged,
     Stability,
@@ -122,6 +123,30 @@ def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(p
     assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
     # steps double after each success, and halve: at most every other one fails
     assert path.failed <= 0.5 * len(path.tried) + math.log2(1.0 / part)
+
+
+def test_a_value_that_failed_is_tried_again_before_what_is_farther():
+    path = Stubborn(0.03)  # steps of at most 0.03: 0.1, 0.05 and 0.025 are tried from 0
+    assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
+    values = [value for value, _ in path.tried]
+    assert values == pytest.approx([0.0, 0.1, 0.05, 0.025, 0.05, 0.1, 0.075, 0.1])
+
+
+class Inverting(Stubborn):
+    """A straight path on which elements are inverted in all predictions but the last equilibrium."""
+
+    def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
+        if start.u[0] not in (0.0, self.reached):
+            raise InvertedGuess
+        return super().solve(start, control)
+
+
+def test_steps_whose_prediction_inverts_elements_begin_at_the_last_equilibrium():
+    path = Inverting(0.03)
+    walk = stepper(path)
+    for wanted in (0.02, 0.04, 0.06):
+        assert walk.advance(LoadControl(wanted)).state.force == wanted
+    assert [value for value, _ in path.tried] == [0.0, 0.02, 0.04, 0.06] and path.failed == 0
 
 
 class Folded(Stubborn):

@@ -237,11 +237,13 @@ class Blueprint:
         return replace(self, links=links, samples=self.samples[-1:], most=12)
 
     def stiffened(self, names: Collection[str]) -> Blueprint:
-        """The same scene with links of some ``names`` rigid."""
+        """The same scene with links of some ``names`` rigid, which neither pressure all around nor prestrain moves."""
         links = tuple(replace(link, centreline=()) if link.name in names else link for link in self.links)
         bending = {link.name for link in links if link.centreline}
         joints = tuple(j if bending & {j.a, j.b} else replace(j, interface=None) for j in self.joints)
-        return replace(self, links=links, joints=joints)
+        within = (PressurePlan, PrestrainPlan)
+        effects = tuple(e for e in self.effects if not (isinstance(e, within) and e.link in names))
+        return replace(self, links=links, joints=joints, effects=effects)
 
     def shuffled(self, seed: int) -> Blueprint:
         """The same scene with links and joints in another order."""
