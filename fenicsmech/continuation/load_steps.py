@@ -26,7 +26,8 @@ the same on all processes and machines, and not by time:
     7. half the step                                           ``LoadSteps.smallest``, ``smallest_snap_step`` once an
                                                                equilibrium past a fold is known, or ``failures`` in
                                                                a row
-    8. the nearest equilibrium found past a fold, a snap       one
+    8. the nearest equilibrium found past a fold, a snap; or   one; or one solve ``snap_iterations`` times as long
+       where no fold is seen, that of a longer solve
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre                                    not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -116,7 +117,8 @@ class LoadSteps:
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
             forces hold zero-energy modes with a smaller stiffness.
         arc_steps: most arc-length steps of motors, and of constant loads.
-        snap_iterations: most iterations of one solve for where motors snap to, over the solver's: descent leads far.
+        snap_iterations: most iterations of one solve for where a mechanism snaps to, over the solver's: descent leads
+            far.
 
     Raises:
         DescriptionError: a number is not positive, a factor is negative, or the number of iterations not whole.
@@ -251,6 +253,7 @@ class LoadStepper(Stepper):
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
         nearest: float | None = None  # ahead, of those tried
+        patient = False  # whether a longer solve was tried
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
         # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
         aside, halved = dict[float, EquilibriumPoint](), False
@@ -279,11 +282,16 @@ class LoadStepper(Stepper):
                 if not (ended or hidden):
                     continue
                 if beyond is None:
-                    fold, reason = self._fold(tried[-1]), failure.reason
-                    raise LoadStepsFailed(
-                        self._last, self._value, reason, tuple(tried), fold=fold, hidden=hidden
-                    ) from failure
-                point, snapped, step = beyond, True, beyond.control.prescribed - self._value
+                    fold, reason = self._fold(value), failure.reason
+                    found = None if hidden or patient or fold is not None else self._patient(control.at(value))
+                    patient = True
+                    if found is None:
+                        raise LoadStepsFailed(
+                            self._last, self._value, reason, tuple(tried), fold=fold, hidden=hidden
+                        ) from failure
+                    point, snapped, step = found, self._snapped(found), value - self._value
+                else:
+                    point, snapped, step = beyond, True, beyond.control.prescribed - self._value
             if snapped:
                 self.snaps += 1
                 self._rate = None
@@ -363,6 +371,18 @@ class LoadStepper(Stepper):
         except NotConverged:
             self.solver = last
             raise
+
+    def _patient(self, control: Control) -> EquilibriumPoint | None:
+        """The equilibrium that more iterations lead to from the last one; None if none is found."""
+        if self._last is None:
+            return None
+        try:
+            point = self.solver.patient(self._steps.snap_iterations).solve(self._last.state, control)
+        except NotConverged as failure:
+            self.iterations += failure.iterations
+            return None
+        self.iterations += point.iterations
+        return point
 
     def _shifted(self, guess: State, control: Control) -> EquilibriumPoint:
         """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there.

@@ -155,6 +155,11 @@ class NewtonSolver(EquilibriumSolver):
         other._moved = self.system.turned
         return other
 
+    def patient(self, factor: int) -> NewtonSolver:
+        other = copy(self)
+        other.options = replace(self.options, iterations=factor * self.options.iterations)
+        return other
+
     def iterate(self, start: State, control: Control) -> EquilibriumPoint:
         system, options, path = self.system, self.options, control.along_path
         limit, least = options.path_iterations if path else options.iterations, start.minimum_shift

@@ -86,6 +86,10 @@ class EquilibriumSolver(ABC):
         """A solver whose steps turn links instead of straining them; None if there is none."""
         return None
 
+    def patient(self, factor: int) -> EquilibriumSolver:
+        """A solver that takes up to ``factor`` times as many iterations; this one if their number has no bound."""
+        return self
+
     def solve(self, start: State, control: Control) -> EquilibriumPoint:
         """The equilibrium near ``start`` under ``control``.
 

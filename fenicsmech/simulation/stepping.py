@@ -25,7 +25,6 @@ from fenicsmech.equilibrium import (
     LoadFactorControl,
     MotorControl,
     NotConverged,
-    PrimalDualNewton,
     State,
     Unknown,
     joint_reactions,
@@ -293,11 +292,10 @@ class CurveStepper:
         farther on the way as it takes to find one: by 1/64 of what is left, 1/32, …, all of it. From there load steps
         go on.
         """
-        solver = self.solver.turning
-        if failure.last is None or solver is None or not isinstance(solver.options, PrimalDualNewton):
+        turning = self.solver.turning
+        if failure.last is None or turning is None:
             return None
-        most = LoadSteps().snap_iterations * solver.options.iterations
-        solver.options = replace(solver.options, iterations=most)
+        solver = turning.patient(LoadSteps().snap_iterations)
         start, reached, iterations = replace(failure.last.state, unstable=False), failure.reached, 0
         for share in 0.5 ** np.arange(6, -1, -1):
             beyond = control.at(reached + float(share) * (1.0 - reached))

@@ -35,16 +35,21 @@ class Stubborn(OneFreedom):
     Args:
         longest: step that succeeds.
         alike: whether solves fail in the same way whatever the least shift.
+        enduring: the same with more iterations; by default it finds nothing.
     """
 
-    def __init__(self, longest: float, *, alike: bool = False) -> None:
+    def __init__(self, longest: float, *, alike: bool = False, enduring: Stubborn | None = None) -> None:
         super().__init__()
-        self.longest, self.alike, self.reached = longest, alike, 0.0
+        self.longest, self.alike, self.enduring, self.reached = longest, alike, enduring, 0.0
         self.tried: list[tuple[float, float]] = []  # prescribed value and least shift of each solve
         self.failed = 0
 
     def hides(self, state: State, control: LoadControl) -> bool:
         return False
+
+    def patient(self, factor: int) -> Stubborn:
+        assert factor == LoadSteps().snap_iterations
+        return self.enduring or Stubborn(-1.0)
 
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.tried.append((control.prescribed, start.minimum_shift))
@@ -83,6 +88,16 @@ def test_where_two_shifts_fail_alike_half_the_step_comes_before_the_third():
         stepper(path, minimum_shift=shift).advance(LoadControl(0.1))
     assert [tried for _, tried in path.tried[1:]] == [shift, 1e-3 * shift] * len(failure.value.tried)
     assert failure.value.reason == "too far"
+
+
+def test_where_no_turn_is_seen_one_longer_solve_comes_before_the_end():
+    enduring = Stubborn(math.inf)
+    path = Stubborn(0.0, enduring=enduring)
+    with pytest.raises(LoadStepsFailed) as failure:
+        stepper(path).advance(LoadControl(0.1))
+    (found,) = [value for value, _ in enduring.tried]
+    assert failure.value.reached == found and 0.0 < found <= 2.0 * LoadSteps().smallest * 0.1
+    assert found in failure.value.tried
 
 
 def test_shifts_where_loads_resist_are_the_smallest_first_away_from_the_start_and_stay_so_after_failures():
