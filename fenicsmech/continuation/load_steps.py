@@ -190,6 +190,7 @@ class LoadStepsFailed(Exception):
         tried: control values without equilibrium.
         fold: the control value at which the path turns back, None if it does not.
         hidden: whether the rounding of stiff links hides what resists at the last equilibrium.
+        straight: whether reactions grow far more than motions over the last step, as where links stretch straight.
     """
 
     def __init__(
@@ -201,10 +202,11 @@ class LoadStepsFailed(Exception):
         *,
         fold: float | None = None,
         hidden: bool = False,
+        straight: bool = False,
     ) -> None:
         super().__init__(reason)
         self.last, self.reached, self.reason, self.tried = last, reached, reason, tried
-        self.fold, self.hidden = fold, hidden
+        self.fold, self.hidden, self.straight = fold, hidden, straight
 
 
 class LoadStepper(Stepper):
@@ -286,8 +288,10 @@ class LoadStepper(Stepper):
                     found = None if hidden or patient or fold is not None else self._patient(control.at(value))
                     patient = True
                     if found is None:
+                        growth, stretches = self._growth()
+                        straight = stretches and growth > steps.fold_growth
                         raise LoadStepsFailed(
-                            self._last, self._value, reason, tuple(tried), fold=fold, hidden=hidden
+                            self._last, self._value, reason, tuple(tried), fold=fold, hidden=hidden, straight=straight
                         ) from failure
                     point, snapped, step = found, self._snapped(found), value - self._value
                 else:
@@ -331,17 +335,23 @@ class LoadStepper(Stepper):
 
             v* = v₁ + (v₁ − v₀) / (g² − 1),     g = |y₁′| / |y₀′|.
 
-        Where links stretch straight, motions grow so too, and the force far more: nothing turns back there.
+        Where links stretch straight nothing turns back.
         """
-        if len(self._points) < 2:
-            return None
-        before, last = (self.system.size(point.tangent) for point in self._points)
-        growth, beyond = last / before if before else 1.0, tried - self._value
-        rates = agreed(self.system.comm, [abs(point.conjugate_rate) for point in self._points])
-        if not (growth > self._steps.fold_growth and rates[1] <= growth**2 * rates[0]):
+        growth, stretches = self._growth()
+        if growth <= self._steps.fold_growth or stretches:
             return None
         ahead = self._width / (growth**2 - 1.0)
-        return self._value + ahead if 0.0 < ahead / beyond <= self._steps.fold_ahead else None
+        return self._value + ahead if 0.0 < ahead / (tried - self._value) <= self._steps.fold_ahead else None
+
+    def _growth(self) -> tuple[float, bool]:
+        """How the tangent has grown over the last step, g; whether the conjugate's rate has by more than g², as where
+        links stretch straight."""
+        if len(self._points) < 2:
+            return 1.0, False
+        before, last = (self.system.size(point.tangent) for point in self._points)
+        growth = last / before if before else 1.0
+        rates = agreed(self.system.comm, [abs(point.conjugate_rate) for point in self._points])
+        return growth, not rates[1] <= growth**2 * rates[0]
 
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent limits the first step."""

@@ -468,6 +468,8 @@ class CurveStepper:
             tried = f"the path turns back near {failure.fold - origin:.6g}; {tried}"
             other = "" if control.constrained else " or displacement control"
             remedy = {"otherwise": f"Use follow(){other}, which goes round the turn, or values before it"}
+        elif control.constrained and failure.straight:
+            remedy = {"otherwise": "The links stretch straight, and the force grows: prescribe less, or the force"}
         problem = (
             f"no equilibrium at {what} {control.prescribed - origin:g}; the last one is at {failure.reached - origin:g}"
             f"{force} ({tried})"

@@ -242,6 +242,23 @@ def test_displacement_beyond_reach_ends_within_the_bounds_with_part_value_remedy
     assert 1 < tried <= LoadSteps().failures
 
 
+def test_a_point_that_straight_links_keep_back_is_said_to_be_out_of_reach():
+    mechanism = fm.Mechanism("two bars beside a leaf")
+    base, near, far = mechanism.rigid("base", fixed=True), mechanism.rigid("near"), mechanism.rigid("far")
+    hinges = [mechanism.revolute(base, near, at=(0, 0)), mechanism.revolute(near, far, at=(30, 10))]
+    shape = fm.strip([(0, -20), (30, -20)], thickness=2.0, depth=2.0)
+    leaf = mechanism.flexible("leaf", shape, fm.Material("rubber", 5.0, 0.45))
+    mechanism.weld(base, leaf, at=(0, -20), interface_radius=0.8)
+    pull = mechanism.force(on=far, at=(60, 0), direction=(1, 0))
+    scene = fm.Scene(mechanism, effects=[JointSpring(hinge, 1.0) for hinge in hinges])
+    simulation = fm.Simulation(scene, space="plane-stress", size=5.0, comm=MPI.COMM_SELF)
+    with pytest.raises(fm.EquilibriumError) as caught:
+        simulation.load_displacement(pull, displacements=[2.0, 4.0])
+    assert "straight" in caught.value.remedy
+    reach = 2.0 * math.hypot(30.0, 10.0) - 60.0
+    assert reach - 2e-3 < caught.value.last.displacement < reach
+
+
 @pytest.mark.parametrize("most", [4, fm.PrimalDualNewton().factorisations])
 def test_a_solve_ends_after_the_factorisations_it_is_given(factorisations, most):
     scene, push = describe("truss")
