@@ -122,7 +122,7 @@ def test_something_other_than_a_method_for_linear_systems_is_refused():
 def test_too_few_iterations_are_given_as_the_reason():
     simulation, push = finger("plane-stress", solver=fm.PrimalDualNewton(iterations=1))
     with pytest.raises(fm.EquilibriumError, match="after 1 iteration"):
-        simulation.load_displacement(push, forces=[5.0])
+        simulation.load_displacement(push, displacements=[500.0])  # out of reach, however many there are
 
 
 def test_failure_names_a_link_softer_than_the_rounding_of_the_one_it_carries_as_its_cause():

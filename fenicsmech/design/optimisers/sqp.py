@@ -170,7 +170,8 @@ class SQP(Optimiser):
             except Infeasible:
                 evaluations += 1
                 continue
-            if found.evaluation.value < end.evaluation.value:
+            violated = np.any(found.evaluation.inequalities.values > self.violation)
+            if found.evaluation.value < end.evaluation.value and not violated:
                 return found
             number, evaluations = found.number, found.evaluations
         problem.evaluate(end.evaluation.parameters)
