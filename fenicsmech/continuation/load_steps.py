@@ -317,8 +317,9 @@ class LoadStepper(Stepper):
 
     def _up_to(self, nearest: float | None, step: float, distance: float) -> float:
         """``step``, at most to the ``nearest`` value where none was found: from near, it is tried again before what is
-        farther; half way to it where the path turns back before it, unless that is a smallest step."""
-        if nearest is None or (nearest - self._value) * step <= 0.0:
+        farther; half way to it where the path turns back before it, unless that is a smallest step. Where links may
+        touch obstacles a value may fail by what touches there, however near it is, and is passed."""
+        if nearest is None or (nearest - self._value) * step <= 0.0 or self.system.contact is not None:
             return step
         left = nearest - self._value
         halved = abs(left) > 2.0 * self._steps.smallest * self._scale(distance) and self._fold(nearest) is not None

@@ -60,6 +60,20 @@ class Balance:
             return rested, left, iterations
         return point, imbalance, iterations
 
+    def reached(self, state: State, control: Control) -> EquilibriumPoint | None:
+        """The equilibrium that links reach from ``state`` as rigid bodies; None if none is found.
+
+        Where nothing resists a force before links touch an obstacle, steps of Newton's method on K only creep.
+        """
+        solver, state = self._solver.turning or self._solver, control.prepare(state)
+        for _ in range(_ROUNDS):
+            state = self._balanced(state, control, descend=True)
+            try:
+                return solver.solve(state, control)
+            except NotConverged:
+                continue
+        return None
+
     def with_force(self, point: EquilibriumPoint, control: Control) -> EquilibriumPoint:
         """The equilibrium at ``point``, of a prescribed displacement, with the force f that balances what acts along
         motions that deform no link.
@@ -86,7 +100,7 @@ class Balance:
         solver, iterations, imbalance = self._solver.turning or self._solver, 0, np.inf
         system = solver.system
         for _ in range(_ROUNDS):
-            state = self._balanced(point, control)
+            state = self._balanced(point.state, control, descend=point.unstable_modes == 0)
             system.load(state)
             residual = system.residual(state, control)
             try:
@@ -102,9 +116,8 @@ class Balance:
             iterations, imbalance = iterations + point.iterations, self.imbalance(point.state, control)
         return point, imbalance, iterations
 
-    def _balanced(self, point: EquilibriumPoint, control: Control) -> State:
-        """The state of ``point`` moved along motions that deform no link to where works along these vanish."""
-        state, descend = point.state, point.unstable_modes == 0
+    def _balanced(self, state: State, control: Control, *, descend: bool) -> State:
+        """``state`` moved along motions that deform no link to where works along these vanish."""
         for _ in range(_ITERATIONS):
             motions = self._motions(state)
             works = self._works(state, control, motions)

@@ -156,6 +156,9 @@ class CurveStepper:
             except LoadStepsFailed as failure:
                 # the first value was sought from rest
                 found = self._from_rest(control) if steps.snaps and iterations and not failure.hidden else None
+                if found is None and self.adrift and not control.constrained:
+                    state = failure.last.state if failure.last else self.start(control).state
+                    found = Balance(self._model, self.solver).reached(state, control)
                 if found is None:
                     raise self._unreached(control, failure) from failure
                 point = found
