@@ -43,9 +43,10 @@ the same on all processes and machines, and not by time:
     14. of curves that have snapped: load steps from rest to    as these
        the value, whose path may go on where that snapped
        to ends
-    15. of forces beside large reactions: solves to a smaller  ``LoadSteps.shift_factors``, a solve each
-       residual by steps that turn links, where motions that
-       deform no link are out of balance
+    15. of forces that nothing resists: links move as rigid    four moves, a solve each
+       bodies to where loads balance, as at an obstacle
+    16. of forces beside large reactions: likewise, where       as these
+       motions that deform no link are out of balance
 
 Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
 a dead load the equilibria past a limit point are not those that the mechanism would take.

@@ -242,6 +242,25 @@ def test_displacement_beyond_reach_ends_within_the_bounds_with_part_value_remedy
     assert 1 < tried <= LoadSteps().failures
 
 
+def test_an_arm_that_nothing_resists_gets_to_a_table_as_a_rigid_body_where_load_steps_fail(monkeypatch):
+    mechanism = fm.Mechanism("arm above a table")
+    base, shape = mechanism.rigid("base", fixed=True), fm.strip([(0, 0), (40, 0)], thickness=3.0, depth=3.0)
+    arm = mechanism.flexible("arm", shape, fm.Material("rubber", 5.0, 0.45))
+    mechanism.revolute(base, arm, at=(0, 0), interface_radius=1.2)
+    push = mechanism.force(on=arm, at=(38, 0), direction=(0, -1))
+    scene = fm.Scene(mechanism, effects=[fm.Contact(arm, fm.HalfPlane((0, -10), (0, 1)))])
+    simulation = fm.Simulation(scene, space="plane-stress", size=2.5, comm=MPI.COMM_SELF)
+    (stepped,) = simulation.load_displacement(push, forces=[1e-5]).frames
+
+    def advance(self, control):
+        raise LoadStepsFailed(None, 0.0, "refused", (control.prescribed,))
+
+    monkeypatch.setattr(LoadStepper, "advance", advance)
+    (moved,) = simulation.load_displacement(push, forces=[1e-5]).frames
+    assert 8.0 < stepped.displacement < 8.5  # the arm begins 8.5 above, and its tip is farther out
+    assert moved.displacement == pytest.approx(stepped.displacement, rel=1e-8)
+
+
 def test_a_point_that_straight_links_keep_back_is_said_to_be_out_of_reach():
     mechanism = fm.Mechanism("two bars beside a leaf")
     base, near, far = mechanism.rigid("base", fixed=True), mechanism.rigid("near"), mechanism.rigid("far")
