@@ -1,8 +1,7 @@
 """Load steps (natural continuation): from a known equilibrium to the wanted value of a control.
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
-when it took few iterations, but pass no value that failed before that is tried again from near, or bisected where the
-path turns back before it; the tangent bounds their motion; equilibria reached are kept. Stepping fails once steps are
+when it took few iterations; the tangent bounds their motion; equilibria reached are kept. Stepping fails once steps are
 small relative to the distance covered, however far the prescribed value: the softest stiffness falls as √(1 − p / p*)
 towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5 % of it. A step that
 moves a coordinate outside the range of the tangents at its ends may have snapped over a fold, where the path turns
@@ -14,8 +13,8 @@ Where an equilibrium is not found at once, fallbacks follow in this order. All o
 the same on all processes and machines, and not by time:
 
     fallback                                                   ends after
-    1. the tangent's prediction, then the last equilibrium,    one each; where other points touch, or elements are
-       where a prediction moves too far                        inverted in a prediction, the latter at once
+    1. the tangent's prediction, then the last equilibrium,    one each; where other points touch, the latter at once;
+       where a prediction moves too far or inverts elements    ``LoadSteps.failures_inverted``
     2. shifts of the KKT matrix until steps descend            ``PrimalDualNewton.shifts`` an iteration
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
@@ -99,6 +98,8 @@ class LoadSteps:
         failures_held: likewise where joints and motors hold the point that is to move.
         failures_hidden: to one value, in a row or not, after which stepping fails where the rounding of stiff links
             hides what resists.
+        failures_inverted: steps in a row without equilibrium, of which the last one's prediction inverts elements,
+            after which steps to the value begin at the last equilibrium.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
             in singular positions, where the tangent is ignored.
         largest_prediction: motion above which a prediction is discarded.
@@ -130,6 +131,7 @@ class LoadSteps:
     failures: int = 40
     failures_held: int = 8
     failures_hidden: int = 3
+    failures_inverted: int = 8
     smallest_limited: float = 1e-6
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
@@ -152,6 +154,7 @@ class LoadSteps:
             failures=1,
             failures_held=1,
             failures_hidden=1,
+            failures_inverted=1,
             iterations=1,
             arc_steps=1,
             snap_iterations=1,
@@ -255,8 +258,8 @@ class LoadStepper(Stepper):
             self._settle(control.at(self._value))
         steps, distance = self._steps, control.prescribed - self._value
         step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
-        nearest: float | None = None  # ahead, of those tried
         patient = False  # whether a longer solve was tried
+        inverts = False  # whether predictions do
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
         # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
         aside, halved = dict[float, EquilibriumPoint](), False
@@ -266,7 +269,10 @@ class LoadStepper(Stepper):
             arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
             value = control.prescribed if arrives else self._value + step
             try:
-                point = aside.pop(value, None) or self._correct(self._guess(control.at(value)), control.at(value))
+                point = aside.pop(value, None)
+                if point is None:
+                    guess = self._last.state if inverts and self._last else self._guess(control.at(value))
+                    point = self._correct(guess, control.at(value))
                 snapped = self._snapped(point)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
                     step, beyond, halved = 0.5 * (value - self._value), point, True
@@ -275,7 +281,8 @@ class LoadStepper(Stepper):
                     continue
             except NotConverged as failure:
                 tried.append(value)
-                nearest, failed, halved = value, failed + 1, True
+                failed, halved = failed + 1, True
+                inverts |= isinstance(failure, InvertedGuess) and failed >= steps.failures_inverted
                 step = 0.5 * (value - self._value)
                 smallest = steps.smallest if beyond is None else steps.smallest_snap_step
                 ended = abs(step) <= smallest * self._scale(distance) or failed >= steps.failures
@@ -314,17 +321,6 @@ class LoadStepper(Stepper):
                 step = control.prescribed - self._value
             elif point.iterations <= steps.iterations:
                 step *= 2.0
-            step = self._up_to(nearest, step, distance)
-
-    def _up_to(self, nearest: float | None, step: float, distance: float) -> float:
-        """``step``, at most to the ``nearest`` value where none was found: from near, it is tried again before what is
-        farther; half way to it where the path turns back before it, unless that is a smallest step. Where links may
-        touch obstacles a value may fail by what touches there, however near it is, and is passed."""
-        if nearest is None or (nearest - self._value) * step <= 0.0 or self.system.contact is not None:
-            return step
-        left = nearest - self._value
-        halved = abs(left) > 2.0 * self._steps.smallest * self._scale(distance) and self._fold(nearest) is not None
-        return min(step, 0.5 * left if halved else left, key=abs)
 
     @property
     def _last(self) -> EquilibriumPoint | None:
@@ -363,16 +359,11 @@ class LoadStepper(Stepper):
             pass
 
     def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind.
-
-        If elements are inverted in it, steps begin at the last equilibrium.
-        """
+        """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind."""
         try:
             return self._shifted(guess, control)
         except InvertedGuess:
-            if not self._points or guess is self._points[-1].state:
-                raise
-            return self._correct(self._points[-1].state, control)
+            raise
         except NotConverged:
             other = self.solver.turning or self._plain
             if other is self.solver:
