@@ -298,6 +298,7 @@ class MechanismModel:
         effect_potentials: potentials of body poses of each effect.
         potentials: all of these.
         spring_potentials: those of springs, which act from the start.
+        compliances: of joints that give way, by row of the joints' constraints.
     """
 
     def __init__(
@@ -353,10 +354,10 @@ class MechanismModel:
         self.effect_potentials = [(effect, tuple(effect.pose_potentials(linkage))) for effect in effects]
         self.potentials = [potential for _, found in self.effect_potentials for potential in found]
         self.spring_potentials = tuple(potential for potential in self.potentials if potential.holds)
-        self._compliances: dict[int, float] = {}
+        self.compliances: dict[int, float] = {}
         for effect in effects:
             for row, compliance in effect.soften(linkage).items():
-                self._compliances[row] = self._compliances.get(row, 0.0) + compliance
+                self.compliances[row] = self.compliances.get(row, 0.0) + compliance
         cell_body = np.where(mesh.interface >= 0, mesh.interface + len(mechanism.rigid_links), -1)
         centres = np.array([body.centre for body in linkage.bodies])
         self.interfaces = InterfaceMap(
@@ -633,7 +634,7 @@ class MechanismModel:
             controlled=controlled,
             loads=loads,
             potentials=self.potentials,
-            compliances=self._compliances,
+            compliances=self.compliances,
             one_sided=one_sided,
             idle=idle,
             resisted=[(spin, self._nodes(spin)) for spin in resisted],

@@ -291,19 +291,12 @@ class LoadStepper(Stepper):
                     hidden = self._plain.hides(self._last.state if self._last else self._start, control.at(self._value))
                 if not (ended or hidden):
                     continue
-                if beyond is None:
-                    fold, reason = self._fold(value), failure.reason
-                    found = None if hidden or patient or fold is not None else self._patient(control.at(value))
-                    patient = True
-                    if found is None:
-                        growth, stretches = self._growth()
-                        straight = stretches and growth > steps.fold_growth
-                        raise LoadStepsFailed(
-                            self._last, self._value, reason, tuple(tried), fold=fold, hidden=hidden, straight=straight
-                        ) from failure
-                    point, snapped, step = found, self._snapped(found), value - self._value
+                if beyond is not None:
+                    point, snapped = beyond, True
                 else:
-                    point, snapped, step = beyond, True, beyond.control.prescribed - self._value
+                    point = self._beyond_steps(control.at(value), failure, tried, hidden, longer=not patient)
+                    snapped, patient = self._snapped(point), True
+                step = point.control.prescribed - self._value
             if snapped:
                 self.snaps += 1
                 self._rate = None
@@ -375,17 +368,33 @@ class LoadStepper(Stepper):
             self.solver = last
             raise
 
-    def _patient(self, control: Control) -> EquilibriumPoint | None:
-        """The equilibrium that more iterations lead to from the last one; None if none is found."""
-        if self._last is None:
-            return None
-        try:
-            point = self.solver.patient(self._steps.snap_iterations).solve(self._last.state, control)
-        except NotConverged as failure:
-            self.iterations += failure.iterations
-            return None
-        self.iterations += point.iterations
-        return point
+    def _beyond_steps(
+        self, control: Control, failure: NotConverged, tried: list[float], hidden: bool, *, longer: bool
+    ) -> EquilibriumPoint:
+        """The equilibrium that more iterations lead to from the last one, where steps end and no fold is seen.
+
+        Args:
+            control: at the value of the last step that failed.
+            failure, tried, hidden: of these steps, see ``LoadStepsFailed``.
+            longer: whether a longer solve is tried, unless ``hidden``.
+
+        Raises:
+            LoadStepsFailed: there is none.
+        """
+        fold = self._fold(control.prescribed)
+        if longer and not hidden and fold is None and self._last is not None:
+            try:
+                point = self.solver.patient(self._steps.snap_iterations).solve(self._last.state, control)
+            except NotConverged as ended:
+                self.iterations += ended.iterations
+            else:
+                self.iterations += point.iterations
+                return point
+        growth, stretches = self._growth()
+        straight = stretches and growth > self._steps.fold_growth
+        raise LoadStepsFailed(
+            self._last, self._value, failure.reason, tuple(tried), fold=fold, hidden=hidden, straight=straight
+        ) from failure
 
     def _shifted(self, guess: State, control: Control) -> EquilibriumPoint:
         """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there.

@@ -60,31 +60,42 @@ class Assembly:
     fraction: float
 
 
-def assemble(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = ()) -> Assembly:
-    """The rigid assembly of ``configuration``; it stops at the last position free of strain of flexible links.
+def assemble(
+    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = (), soft: tuple[int, ...] = ()
+) -> Assembly:
+    """The rigid assembly of ``configuration``; it stops at the last position free of strain of flexible links, and of
+    joints that give way.
 
     Without springs, each is found once for the present places of joints and offsets of motors.
 
+    Args:
+        linkage: the mechanism.
+        configuration: to which its motors move.
+        springs: potentials of the poses.
+        soft: rows of the constraints of joints that give way.
+
     Raises:
-        AssemblyError: a loop does not close even with freely deformable links.
+        AssemblyError: a loop does not close even with freely deformable links, and joints that give way apart.
         EquilibriumError: the motors take a spring beyond the poses that it holds for.
     """
     if springs:
-        return _assembled(linkage, configuration, springs)
-    places = linkage.joints.key, linkage.rigid.key
+        return _assembled(linkage, configuration, springs, soft)
+    places = linkage.joints.key, linkage.rigid.key, soft
     if places not in linkage.assembled:
         linkage.assembled.clear()
         linkage.assembled[places] = {}
     found = linkage.assembled[places]
     if configuration not in found:
-        found[configuration] = _assembled(linkage, configuration, springs)
+        found[configuration] = _assembled(linkage, configuration, springs, soft)
     return found[configuration]
 
 
-def _assembled(linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential]) -> Assembly:
+def _assembled(
+    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential], soft: tuple[int, ...]
+) -> Assembly:
     poses, fraction, _ = Assembler(linkage.rigid, springs).move(configuration)
     if fraction < 1.0:
-        _, closing, worst = Assembler(linkage.joints).move(configuration)
+        _, closing, worst = Assembler(linkage.joints, soft=soft).move(configuration)
         if closing < 1.0:
             raise AssemblyError(
                 f"configuration {configuration.name!r}",
@@ -97,13 +108,13 @@ def _assembled(linkage: Linkage, configuration: Configuration, springs: Sequence
 
 
 def assemble_before_strain(
-    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = ()
+    linkage: Linkage, configuration: Configuration, springs: Sequence[PosePotential] = (), soft: tuple[int, ...] = ()
 ) -> Assembly:
     """As ``assemble``, but 98 % of the way to the last position free of strain where motors strain the links.
 
     That one is a dead centre as a rule, where paths cross and freedoms count twice.
     """
-    assembly = assemble(linkage, configuration, springs)
+    assembly = assemble(linkage, configuration, springs, soft)
     if assembly.fraction == 1.0:
         return assembly
     fraction = 0.98 * assembly.fraction
@@ -116,6 +127,9 @@ class Assembler:
     """Motion of the motors of one set of constraints; lengths are in that of the mechanism, angles in rad.
 
     Attributes:
+        system: the constraints.
+        springs: potentials of the poses.
+        soft: rows of constraints that are left open, in ``system``.
         closed: largest scaled constraint residual of a closed assembly: some hundred roundings.
         largest_step: motor motion in one step; far below the turns at which a loop has several assemblies.
         smallest_step: part of the first step at which the motion ends: motors strain the mechanism there.
@@ -127,6 +141,7 @@ class Assembler:
 
     system: JointSystem
     springs: Sequence[PosePotential] = ()
+    soft: tuple[int, ...] = ()
     closed: float = 1e-13
     largest_step: float = 0.1
     smallest_step: float = 1e-4
@@ -177,15 +192,16 @@ class Assembler:
 
     def close(self, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gauss–Newton from ``poses``; returns the best poses and their scaled residual."""
-        system = self.system
-        residual = system.row_scale * system.value(poses, motors)
+        system, scale = self.system, self.system.row_scale.copy()
+        scale[list(self.soft)] = 0.0
+        residual = scale * system.value(poses, motors)
         for _ in range(25):
             if np.max(np.abs(residual), initial=0.0) <= 1e-15 or not system.rows:
                 break
-            scaled = system.scaled_gradient(poses, motors)
+            scaled = scale[:, None] * system.gradient(poses, motors) * system.pose_scale
             step = system.pose_scale * np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
             trial = system.with_unknowns(poses, system.unknowns(poses) + step)
-            new = system.row_scale * system.value(trial, motors)
+            new = scale * system.value(trial, motors)
             if np.linalg.norm(new) >= np.linalg.norm(residual) and self.is_closed(residual):
                 break
             poses, residual = trial, new

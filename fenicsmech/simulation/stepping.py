@@ -64,7 +64,8 @@ class CurveStepper:
         model, rigid, springs = self._model, self._model.linkage.rigid, self._model.spring_potentials
         # of one process: decisions that depend on rounding are the same on all
         comm, configuration = discretisation.comm, request.configuration
-        assembly = from_one(comm, lambda: assemble_before_strain(model.linkage, configuration, springs))
+        soft = tuple(model.compliances)
+        assembly = from_one(comm, lambda: assemble_before_strain(model.linkage, configuration, springs, soft))
         motors = rigid.on_the_way(configuration.position, assembly.fraction)
         self.solver = discretisation.solver(request.part, [other for other, _ in request.others])
         self._system, self._joints = self.solver.system, model.linkage.joints

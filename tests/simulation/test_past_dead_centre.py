@@ -31,3 +31,29 @@ def test_a_rocker_is_pulled_beyond_the_reach_of_its_coupler():
     pull = np.array(frame.reactions[pin.name].force)[:2]
     assert abs(pull @ along) == pytest.approx(np.linalg.norm(pull), rel=1e-8)
     assert np.linalg.norm(pull) > 0.01
+
+
+def test_a_joint_that_gives_way_lets_a_motor_pull_rigid_links_apart():
+    mechanism = fm.Mechanism("soft joint")
+    base, rocker, coupler = (mechanism.rigid(name, fixed=name == "base") for name in ("base", "rocker", "coupler"))
+    rubber = fm.Material("rubber", 1.0, 0.4)
+    leaf = mechanism.flexible("leaf", fm.strip([(60, 40), (60, 60)], thickness=4.0, depth=4.0), rubber)
+    motor = mechanism.motor(mechanism.revolute(base, rocker, at=(60, 0)))
+    mechanism.clamp(rocker, leaf, end="start", length=4.0)
+    pin = mechanism.revolute(rocker, coupler, at=(60, 40))
+    mechanism.revolute(coupler, base, at=(0, 30))
+    push = mechanism.force(on=rocker, at=(60, 40), direction=(1, 0))
+    softness = 5.0
+    simulation = fm.Simulation(
+        fm.Scene(mechanism, [fm.JointCompliance(pin, softness)]), space="plane-stress", size=4.0, comm=MPI.COMM_SELF
+    )
+    angle = -1.0  # the coupler reaches to an angle of −0.17
+    beyond = simulation.scene.configuration("beyond", {motor: angle})
+    (frame,) = simulation.load_displacement(push, forces=[0.0], configuration=beyond).frames
+    # the coupler turns into the line from its pivot to the rocker's end, and the joint opens by what is missing
+    end = np.array([60.0 - 40.0 * np.sin(angle), 40.0 * np.cos(angle)])
+    line = end - (0.0, 30.0)
+    opened = np.linalg.norm(line) - np.hypot(60.0, 10.0)
+    assert frame.stable
+    assert opened > 20.0
+    assert np.linalg.norm(frame.reactions[pin.name].force) == pytest.approx(opened / softness, rel=1e-9)
