@@ -133,13 +133,15 @@ class RestPoses:
         self._last = control.constrained, wanted, rest
         return rest
 
-    def balanced(self) -> State | None:
-        """The pose in which constant loads balance with springs that are not far stronger; None without springs,
-        or if that is the pose as drawn, or none is found."""
-        if not self._model.spring_potentials:
-            return None
+    def balanced(self, factor: float = 0.0) -> State | None:
+        """The pose in which all loads balance, and springs, none of them far stronger than others; None if that is the
+        pose as drawn, or none is found.
+
+        Args:
+            factor: of the controlled force.
+        """
         model, rigid, unloaded = self._model, self._model.linkage.rigid, self._unloaded
-        levels = ((), (*model.spring_potentials, *self._constant))
+        levels = ((), (*model.spring_potentials, *self._constant, *self._dead(self._ratios, factor)))
         turn = from_one(model.mesh.mesh.comm, lambda: self._search.pose(rigid, unloaded.poses, self._motors, levels))
         still = np.array_equal(turn.way[-1], unloaded.poses)
         if still or turn.ending is not RestEnding.AT_REST or any(True for _ in self._met_on(turn.way)):

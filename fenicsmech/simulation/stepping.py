@@ -158,8 +158,7 @@ class CurveStepper:
                 # the first value was sought from rest
                 found = self._from_rest(control) if steps.snaps and iterations and not failure.hidden else None
                 if found is None and self.adrift and not control.constrained:
-                    state = failure.last.state if failure.last else self.start(control).state
-                    found = Balance(self._model, self.solver).reached(state, control)
+                    found = self._reached(control, failure.last)
                 if found is None:
                     raise self._unreached(control, failure) from failure
                 point = found
@@ -205,6 +204,18 @@ class CurveStepper:
         self._effort += Effort(stepper.iterations, stepper.snaps + 1)
         self._start = replace(start, steps=stepper)
         return point
+
+    def _reached(self, control: Control, last: EquilibriumPoint | None) -> EquilibriumPoint | None:
+        """The equilibrium that links reach as rigid bodies: in the pose in which all loads balance, or from the last
+        one; None if none is found."""
+        start, balance = self.start(control), Balance(self._model, self.solver)
+        state = last.state if last else start.state
+        pose = self._rest_poses.balanced(control.prescribed)
+        found = None if pose is None else balance.reached(replace(state, u=pose.u, poses=pose.poses), control)
+        found = found or balance.reached(state, control)
+        if found is not None:
+            self._start = replace(start, steps=self._steps_from(start.rest, found.state, control))
+        return found
 
     @contextmanager
     def keeping_frames(self) -> Iterator[None]:
@@ -437,7 +448,7 @@ class CurveStepper:
         Constant loads that are not far weaker than springs swing a mechanism far, past folds where it snaps. Where
         springs are softer than the rounding of what loads the links, each load step comes to rest elsewhere.
         """
-        if (pose := self._rest_poses.balanced()) is None:
+        if not self._model.spring_potentials or (pose := self._rest_poses.balanced()) is None:
             return None
         all_loads = control.at(1.0)
         start = replace(all_loads.prepare(pose), minimum_shift=LoadSteps().minimum_shift)
