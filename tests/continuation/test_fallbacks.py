@@ -254,6 +254,30 @@ def test_an_arm_that_nothing_resists_gets_to_a_table_as_a_rigid_body_where_load_
     assert moved.displacement == pytest.approx(stepped.displacement, rel=1e-8)
 
 
+def test_an_arm_turns_over_against_a_small_constant_load_where_load_steps_fail(monkeypatch):
+    mechanism = fm.Mechanism("arm")
+    base, shape = mechanism.rigid("base", fixed=True), fm.strip([(0, 0), (40, 0)], thickness=3.0, depth=3.0)
+    arm = mechanism.flexible("arm", shape, fm.Material("rubber", 5.0, 0.45))
+    mechanism.revolute(base, arm, at=(0, 0), interface_radius=1.2)
+    push = mechanism.force(on=arm, at=(38, 0), direction=(0, 1))
+    weight = mechanism.force(on=arm, at=(38, 0), direction=(0, -1))
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.5, comm=MPI.COMM_SELF)
+    advance, refused = LoadStepper.advance, []
+
+    def refuse(self, control):
+        if control.prescribed == 1e-4 and not refused:
+            refused.append(control.prescribed)
+            raise LoadStepsFailed(None, 0.0, "refused", (control.prescribed,))
+        return advance(self, control)
+
+    monkeypatch.setattr(LoadStepper, "advance", refuse)
+    up, higher = simulation.load_displacement(push, forces=[1e-4, 2e-4], others={weight: 1e-8}).frames
+    # from lying, as drawn, to standing; without the push it hangs
+    assert [up.displacement, higher.displacement] == pytest.approx([38.0, 38.0], rel=1e-5)
+    assert up.stable and higher.stable
+    assert higher.iterations < 12
+
+
 def test_a_point_that_straight_links_keep_back_is_said_to_be_out_of_reach():
     mechanism = fm.Mechanism("two bars beside a leaf")
     base, near, far = mechanism.rigid("base", fixed=True), mechanism.rigid("near"), mechanism.rigid("far")

@@ -70,9 +70,10 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
     ground, over the mechanism's length; −∞ where flexible links, slides or joints that give way are in between.
 
     A point in the interface of a flexible link's joint moves with that as a rigid body. Welds, and joints whose motors
-    stay as drawn, make one body of two."""
+    stay as drawn, make one body of two; motors of hinges on the ground put points at places."""
     soft = {plan.joint for plan in scene.effects if isinstance(plan, CompliancePlan)}
-    still = {motor.joint for motor in scene.motors if not motor.position}
+    positions = {motor.joint: motor.position for motor in scene.motors}
+    still = {joint for joint, position in positions.items() if not position}
     stiff = [joint for joint in scene.joints if joint.name not in soft]
     welds = {joint.name for joint in stiff if joint.kind == "weld" or joint.name in still}
 
@@ -92,6 +93,10 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
                 if other.fixed and joint.kind == "revolute" and joint.name not in welds:
                     axis = np.array(joint.axis or (0.0, 0.0, 1.0))
                     axis /= np.linalg.norm(axis)
+                    if joint.name in positions:
+                        turn = positions[joint.name] * (1.0 if other.name == joint.a else -1.0)
+                        yield _Chain(pin + Rotation.from_rotvec(turn * axis).apply(point - pin))
+                        continue
                     centre = pin + axis * (axis @ (point - pin))
                     yield _Chain(centre, circle=float(np.linalg.norm(point - centre)), axis=axis)
                     continue
