@@ -67,6 +67,7 @@ with x held:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fenicsmech.collective import agreed
@@ -272,7 +273,7 @@ class LoadStepper(Stepper):
                 point = aside.pop(value, None)
                 if point is None:
                     guess = self._last.state if inverts and self._last else self._guess(control.at(value))
-                    point = self._correct(guess, control.at(value))
+                    point = self._correct(guess, control.at(value), brief=self._straight and self._failed(value, tried))
                 snapped = self._snapped(point)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
                     step, beyond, halved = 0.5 * (value - self._value), point, True
@@ -334,6 +335,16 @@ class LoadStepper(Stepper):
         ahead = self._width / (growth**2 - 1.0)
         return self._value + ahead if 0.0 < ahead / (tried - self._value) <= self._steps.fold_ahead else None
 
+    @property
+    def _straight(self) -> bool:
+        """Whether links stretch straight, beyond which no force gets."""
+        growth, stretches = self._growth()
+        return stretches and growth > self._steps.fold_growth
+
+    def _failed(self, value: float, tried: Sequence[float]) -> bool:
+        """Whether one of the values ``tried`` is at ``value``, or before."""
+        return any(abs(own - self._value) <= abs(value - self._value) for own in tried)
+
     def _growth(self) -> tuple[float, bool]:
         """How the tangent has grown over the last step, g; whether the conjugate's rate has by more than g², as where
         links stretch straight."""
@@ -351,15 +362,16 @@ class LoadStepper(Stepper):
         except NotConverged:
             pass
 
-    def _correct(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind."""
+    def _correct(self, guess: State, control: Control, *, brief: bool = False) -> EquilibriumPoint:
+        """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind;
+        ``brief``: by one solve."""
         try:
-            return self._shifted(guess, control)
+            return self._shifted(guess, control, brief)
         except InvertedGuess:
             raise
         except NotConverged:
             other = self.solver.turning or self._plain
-            if other is self.solver:
+            if other is self.solver or brief:
                 raise
         last, self.solver = self.solver, other
         try:
@@ -369,7 +381,7 @@ class LoadStepper(Stepper):
             raise
 
     def _beyond_steps(
-        self, control: Control, failure: NotConverged, tried: list[float], hidden: bool, *, longer: bool
+        self, control: Control, failure: NotConverged, tried: Sequence[float], hidden: bool, *, longer: bool
     ) -> EquilibriumPoint:
         """The equilibrium that more iterations lead to from the last one, where steps end and no fold is seen.
 
@@ -390,14 +402,13 @@ class LoadStepper(Stepper):
             else:
                 self.iterations += point.iterations
                 return point
-        growth, stretches = self._growth()
-        straight = stretches and growth > self._steps.fold_growth
         raise LoadStepsFailed(
-            self._last, self._value, failure.reason, tuple(tried), fold=fold, hidden=hidden, straight=straight
+            self._last, self._value, failure.reason, tuple(tried), fold=fold, hidden=hidden, straight=self._straight
         ) from failure
 
-    def _shifted(self, guess: State, control: Control) -> EquilibriumPoint:
-        """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there.
+    def _shifted(self, guess: State, control: Control, brief: bool = False) -> EquilibriumPoint:
+        """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there; ``brief``: with
+        the first one.
 
         Two that fail alike show that shifts make no difference.
         """
@@ -412,7 +423,7 @@ class LoadStepper(Stepper):
             except NotConverged as failure:
                 self.iterations += failure.iterations
                 before, failed = failed, (failure.reason, failure.iterations)
-                if failed == before:
+                if brief or failed == before:
                     break
                 continue
             self.iterations += point.iterations
