@@ -18,10 +18,10 @@ the same on all processes and machines, and not by time:
     2. shifts of the KKT matrix until steps descend            ``PrimalDualNewton.shifts`` an iteration
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
-    5. other least shifts of zero-energy modes                 ``LoadSteps.shift_factors``, a solve each, or two that
-                                                               fail alike
+    5. other least shifts of zero-energy modes; not where      ``LoadSteps.shift_factors``, a solve each, or two that
+       links stretch straight and a value has failed           fail alike
     6. steps that turn links (``equilibrium.turning``), 1 to   as these; the kind that led to the last equilibrium
-       5, or those that do not                                 comes first
+       5, or those that do not; likewise                       comes first
     7. half the step                                           ``LoadSteps.smallest``, ``smallest_snap_step`` once an
                                                                equilibrium past a fold is known, or ``failures`` in
                                                                a row
@@ -42,8 +42,9 @@ the same on all processes and machines, and not by time:
     14. of curves that have snapped: load steps from rest to    as these
        the value, whose path may go on where that snapped
        to ends
-    15. of forces that nothing resists: links move as rigid    four moves, a solve each
-       bodies to where loads balance, as at an obstacle
+    15. of forces that nothing resists: links move as rigid    four moves, a solve each, from both
+       bodies to where loads balance, as at an obstacle: from
+       the rigid pose in which all do, then the last one
     16. of forces beside large reactions: likewise, where       as these
        motions that deform no link are out of balance
 
