@@ -259,7 +259,7 @@ class LoadStepper(Stepper):
         if not self._points:
             self._settle(control.at(self._value))
         steps, distance = self._steps, control.prescribed - self._value
-        step, tried, failed = distance, [], 0  # failed: steps since the last equilibrium
+        step, tried, failed = distance, list[float](), 0  # failed: steps since the last equilibrium
         patient = False  # whether a longer solve was tried
         inverts = False  # whether predictions do
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
