@@ -6,7 +6,12 @@ Joints at pins x₀ on the ground, x₁, … of a chain of rigid links keep a po
     |P − x₀| ≤ ρ = |x₁ − x₀| + … + |P − xₙ|,
 
 so that it travels by no more than d · (x₀ − P) ± ρ along d, which is exact. A hinge at x₀ of axis a leaves x₁ a circle
-about it, and P no more than |d × a| times its radius in place of |x₁ − x₀|, about its centre.
+about it, and P no more than |d × a| times its radius in place of |x₁ − x₀|, about its centre. Points P_i of links that
+turn about the same hinge by one angle travel by
+
+    Σ d_i · (R(θ) − 1) r_i,     |Σ d_i · R(θ) r_i| ≤ |Σ (d_i · r_i + i d_i · (a × r_i))|,
+
+r_i from the axis to P_i.
 
 A flexible link is replaced by strings between its joints and the point of the force, s the length of link between the
 ends of a string and d their distance: nothing resists while d < s. Rigid links, joints and motors are as they are;
@@ -52,17 +57,22 @@ class _String:
 
 @dataclass(frozen=True)
 class _Chain:
-    """Where rigid links let a point get: within ``ball`` of a circle about an ``axis`` through ``centre``."""
+    """Where rigid links let a point get: within ``ball`` of a circle about an ``axis`` through ``centre``, on which
+    ``arm`` ends as drawn; by the angle of a ``hinge``."""
 
     centre: np.ndarray
     ball: float = 0.0
-    circle: float = 0.0
+    arm: np.ndarray = field(default_factory=lambda: np.zeros(3))
     axis: np.ndarray = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))
+    hinge: str = ""
 
     def reach(self, direction: np.ndarray) -> float:
         """How far from the centre along a ``direction``, of any length, at most."""
-        across = np.linalg.norm(np.cross(direction, self.axis))
-        return self.ball * float(np.linalg.norm(direction)) + self.circle * float(across)
+        return self.ball * float(np.linalg.norm(direction)) + abs(self.turning(direction))
+
+    def turning(self, direction: np.ndarray) -> complex:
+        """d · r + i d · (a × r), whose phase the angle of the hinge adds to."""
+        return complex(direction @ self.arm, direction @ np.cross(self.axis, self.arm))
 
 
 def beyond_chains(scene: Blueprint, travel: float) -> float:
@@ -98,22 +108,25 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
                         yield _Chain(pin + Rotation.from_rotvec(turn * axis).apply(point - pin))
                         continue
                     centre = pin + axis * (axis @ (point - pin))
-                    yield _Chain(centre, circle=float(np.linalg.norm(point - centre)), axis=axis)
+                    yield _Chain(centre, arm=point - centre, axis=axis, hinge=joint.name)
                     continue
                 at, own = (point, 0.0) if joint.name in welds else (pin, arm)
                 for chain in chains(other, at, (*passed, joint.name)):
                     yield replace(chain, ball=chain.ball + own)
 
     least = most = 0.0
+    together: list[dict[str, np.ndarray]] = []  # middles and turnings of points on links that a hinge turns alone
     for ratio, force in zip(scene.ratios, scene.forces, strict=False):
         point, direction = _in_space(force.at), _in_space(force.direction)
         direction *= ratio / np.linalg.norm(direction)
-        found = [
-            (direction @ (chain.centre - point), chain.reach(direction))
-            for chain in chains(scene.link(force.on), point, ())
-        ]
-        least += max((middle - reach for middle, reach in found), default=-np.inf)
-        most += min((middle + reach for middle, reach in found), default=np.inf)
+        ends = [(direction @ (chain.centre - point), chain) for chain in chains(scene.link(force.on), point, ())]
+        least += max((middle - chain.reach(direction) for middle, chain in ends), default=-np.inf)
+        most += min((middle + chain.reach(direction) for middle, chain in ends), default=np.inf)
+        alone = [(middle, chain) for middle, chain in ends if chain.hinge and not chain.ball]
+        together.append({chain.hinge: np.array((middle, chain.turning(direction))) for middle, chain in alone})
+    for hinge in set(together[0]).intersection(*together[1:]):
+        middle, turning = sum(own[hinge] for own in together)
+        least, most = max(least, middle.real - abs(turning)), min(most, middle.real + abs(turning))
     return max(travel - most, least - travel) / scene.length
 
 

@@ -195,6 +195,14 @@ def test_a_point_on_a_hinged_link_in_space_stays_on_a_circle():
     assert [beyond_chains(scene, travel) > 0.0 for travel in (-3.01, -2.99, 2.99, 3.01)] == [True, False, False, True]
 
 
+def test_points_of_one_crank_do_not_get_as_far_together_as_each_alone():
+    # pushed to the right at the end and up in the middle: 10 sin θ + 5 (cos θ − 1) is √125 − 5 at most
+    pushes = (ForcePlan("load", "crank", (0.0, 10.0), (1.0, 0.0)), ForcePlan("up", "crank", (0.0, 5.0), (0.0, 1.0)))
+    scene, most = replace(hung(), forces=pushes, ratios=(1.0, 1.0)), np.sqrt(125.0)
+    reached = [beyond_chains(scene, travel) > 0.0 for travel in (-5.1 - most, -4.9 - most, most - 5.1, most - 4.9)]
+    assert reached == [True, False, False, True]
+
+
 def test_a_point_in_an_interface_turns_about_the_pin_of_a_crank_that_its_motor_holds():
     # 1 to the right of the pin at (0, 10), pushed up
     off = replace(hung(), forces=(ForcePlan("load", "strip", (1.0, 10.0), (0.0, 1.0)),))
