@@ -60,19 +60,21 @@ class Balance:
             return rested, left, iterations
         return point, imbalance, iterations
 
-    def reached(self, state: State, control: Control) -> EquilibriumPoint | None:
-        """The equilibrium that links reach from ``state`` as rigid bodies; None if none is found.
+    def reached(self, state: State, control: Control) -> tuple[EquilibriumPoint | None, int]:
+        """The equilibrium that links reach from ``state`` as rigid bodies, None if none is found; iterations spent.
 
         Where nothing resists a force before links touch an obstacle, steps of Newton's method on K only creep.
         """
-        solver, state = self._solver.turning or self._solver, control.prepare(state)
+        solver, state, iterations = self._solver.turning or self._solver, control.prepare(state), 0
         for _ in range(_ROUNDS):
             state = self._balanced(state, control, descend=True)
             try:
-                return solver.solve(state, control)
-            except NotConverged:
+                point = solver.solve(state, control)
+            except NotConverged as failure:
+                iterations += failure.iterations
                 continue
-        return None
+            return point, iterations + point.iterations
+        return None, iterations
 
     def with_force(self, point: EquilibriumPoint, control: Control) -> EquilibriumPoint:
         """The equilibrium at ``point``, of a prescribed displacement, with the force f that balances what acts along

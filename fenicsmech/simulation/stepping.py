@@ -209,13 +209,16 @@ class CurveStepper:
         """The equilibrium that links reach as rigid bodies: in the pose in which all loads balance, or from the last
         one; None if none is found."""
         start, balance = self.start(control), Balance(self._model, self.solver)
-        state = last.state if last else start.state
-        pose = self._rest_poses.balanced(control.prescribed)
-        found = None if pose is None else balance.reached(replace(state, u=pose.u, poses=pose.poses), control)
-        found = found or balance.reached(state, control)
-        if found is not None:
-            self._start = replace(start, steps=self._steps_from(start.rest, found.state, control))
-        return found
+        states = [last.state if last else start.state]
+        if (pose := self._rest_poses.balanced(control.prescribed)) is not None:
+            states.insert(0, replace(states[0], u=pose.u, poses=pose.poses))
+        for state in states:
+            found, iterations = balance.reached(state, control)
+            self._effort += Effort(iterations)
+            if found is not None:
+                self._start = replace(start, steps=self._steps_from(start.rest, found.state, control))
+                return found
+        return None
 
     @contextmanager
     def keeping_frames(self) -> Iterator[None]:
