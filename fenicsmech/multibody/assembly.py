@@ -43,10 +43,13 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenicsmech.errors import AssemblyError
 from fenicsmech.joints import across
+from fenicsmech.log import logger
 from fenicsmech.mechanism import Configuration
 from fenicsmech.multibody.linkage import RANK, JointSystem, Linkage
 from fenicsmech.multibody.potentials import PosePotential
 from fenicsmech.multibody.spins import Spin
+
+_log = logger(__name__)
 
 
 @dataclass(frozen=True)
@@ -95,14 +98,17 @@ def _assembled(
 ) -> Assembly:
     poses, fraction, _ = Assembler(linkage.rigid, springs).move(configuration)
     if fraction < 1.0:
-        _, closing, worst = Assembler(linkage.joints, soft=soft).move(configuration)
+        _, closing, worst = Assembler(linkage.joints).move(configuration)
         if closing < 1.0:
-            raise AssemblyError(
-                f"configuration {configuration.name!r}",
-                f"the loop through {_loop(linkage.joints, worst)} does not close: "
-                f"the motors get {math.floor(1e3 * closing) / 10:.1f}% of the way",  # rounded down
-                "Check motor positions and link lengths",
-            )
+            where, loop = f"configuration {configuration.name!r}", f"the loop through {_loop(linkage.joints, worst)}"
+            share = f"{math.floor(1e3 * closing) / 10:.1f}%"  # rounded down
+            if not soft or Assembler(linkage.joints, soft=soft).move(configuration)[1] < 1.0:
+                raise AssemblyError(
+                    where,
+                    f"{loop} does not close: the motors get {share} of the way",
+                    "Check motor positions and link lengths",
+                )
+            _log.warning("%s: from %s of the motors' way on, %s is open in joints that give way", where, share, loop)
     poses.setflags(write=False)  # shared
     return Assembly(poses, fraction)
 
