@@ -27,7 +27,7 @@ only if it is the global one, which nothing here proves.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -35,7 +35,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.spatial.transform import Rotation
 
-from .blueprint import Blueprint, CompliancePlan, LinkPlan
+from .blueprint import Blueprint, CompliancePlan, JointPlan, LinkPlan
 from .closure import Place
 from .potential import Potential
 from .thresholds import THRESHOLDS
@@ -75,22 +75,38 @@ class _Chain:
         return complex(direction @ self.arm, direction @ np.cross(self.axis, self.arm))
 
 
+@dataclass(frozen=True)
+class _Motion:
+    """Of a rigid body: x to R x + t."""
+
+    turn: Rotation = field(default_factory=Rotation.identity)
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def at(self, point: np.ndarray) -> np.ndarray:
+        """Where a point gets."""
+        return self.turn.apply(point) + self.shift
+
+    def after(self, first: _Motion) -> _Motion:
+        """``first``, and then this one."""
+        return _Motion(self.turn * first.turn, self.at(first.shift))
+
+
 def beyond_chains(scene: Blueprint, travel: float) -> float:
     """How far a ``travel`` of the forces' points from the drawn configuration is beyond the reach of rigid links on the
     ground, over the mechanism's length; −∞ where flexible links, slides or joints that give way are in between.
 
     A point in the interface of a flexible link's joint moves with that as a rigid body. Welds, and joints whose motors
-    stay as drawn, make one body of two; motors of hinges on the ground put points at places."""
+    stay as drawn, make one body of two; motors from the ground on put links at places."""
     soft = {plan.joint for plan in scene.effects if isinstance(plan, CompliancePlan)}
     positions = {motor.joint: motor.position for motor in scene.motors}
-    still = {joint for joint, position in positions.items() if not position}
     stiff = [joint for joint in scene.joints if joint.name not in soft]
-    welds = {joint.name for joint in stiff if joint.kind == "weld" or joint.name in still}
+    welds = {joint.name for joint in stiff if joint.kind == "weld" or positions.get(joint.name) == 0.0}
+    held = _held(scene, stiff, positions)
 
     def chains(link: LinkPlan, point: np.ndarray, passed: tuple[str, ...]) -> Iterator[_Chain]:
         """Those that end at a ``point`` of a link."""
-        if link.fixed:
-            yield _Chain(point)
+        if link.name in held:
+            yield _Chain(held[link.name].at(point))
             return
         for joint in stiff:
             pinned = joint.kind != "prismatic" or joint.name in welds
@@ -100,15 +116,15 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
                 radius = joint.interface if isinstance(joint.interface, float) else 0.0  # clamps are not turned about
                 if link.centreline and not arm < _WITHIN * radius:
                     continue
-                if other.fixed and joint.kind == "revolute" and joint.name not in welds:
-                    axis = np.array(joint.axis or (0.0, 0.0, 1.0))
-                    axis /= np.linalg.norm(axis)
+                if other.name in held and joint.kind == "revolute" and joint.name not in welds:
+                    there, axis = held[other.name], _axis(joint)
                     if joint.name in positions:
-                        turn = positions[joint.name] * (1.0 if other.name == joint.a else -1.0)
-                        yield _Chain(pin + Rotation.from_rotvec(turn * axis).apply(point - pin))
+                        motion = there.after(_driven(joint, positions[joint.name], onward=other.name == joint.a))
+                        yield _Chain(motion.at(point))
                         continue
                     centre = pin + axis * (axis @ (point - pin))
-                    yield _Chain(centre, arm=point - centre, axis=axis, hinge=joint.name)
+                    turned, across = there.turn.apply(axis), there.turn.apply(point - centre)
+                    yield _Chain(there.at(centre), arm=across, axis=turned, hinge=joint.name)
                     continue
                 at, own = (point, 0.0) if joint.name in welds else (pin, arm)
                 for chain in chains(other, at, (*passed, joint.name)):
@@ -128,6 +144,34 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
         middle, turning = sum(own[hinge] for own in together)
         least, most = max(least, middle.real - abs(turning)), min(most, middle.real + abs(turning))
     return max(travel - most, least - travel) / scene.length
+
+
+def _held(scene: Blueprint, stiff: Sequence[JointPlan], positions: dict[str, float]) -> dict[str, _Motion]:
+    """Motions of the rigid links that joints and motors hold, one after the other from the ground on."""
+    held = {link.name: _Motion() for link in scene.links if link.fixed}
+    for _ in scene.links:
+        for joint in stiff:
+            if joint.kind != "weld" and joint.name not in positions:
+                continue
+            for base, link in ((joint.a, joint.b), (joint.b, joint.a)):
+                if base in held and link not in held and not scene.link(link).centreline:
+                    own = _driven(joint, positions.get(joint.name, 0.0), onward=base == joint.a)
+                    held[link] = held[base].after(own)
+    return held
+
+
+def _driven(joint: JointPlan, position: float, *, onward: bool) -> _Motion:
+    """Of a joint's link b against a, to the ``position`` of its motor; ``onward`` or else of a against b."""
+    way = (position if onward else -position) * _axis(joint)
+    if joint.kind == "prismatic":
+        return _Motion(shift=way)
+    turn, pin = Rotation.from_rotvec(way), _in_space(joint.at)
+    return _Motion(turn, pin - turn.apply(pin))
+
+
+def _axis(joint: JointPlan) -> np.ndarray:
+    axis = _in_space(joint.axis or (0.0, 0.0, 1.0))
+    return axis / np.linalg.norm(axis)
 
 
 def _in_space(vector: tuple[float, ...]) -> np.ndarray:

@@ -195,6 +195,23 @@ def test_a_point_on_a_hinged_link_in_space_stays_on_a_circle():
     assert [beyond_chains(scene, travel) > 0.0 for travel in (-3.01, -2.99, 2.99, 3.01)] == [True, False, False, True]
 
 
+def test_a_motor_moves_the_pin_that_a_point_turns_about():
+    # a slide takes the pin 2 to the right, the point is 3 off it, drawn above
+    slide = JointPlan("S", "prismatic", "base", "crank", (0.0, 0.0), axis=(1.0, 0.0))
+    pin = JointPlan("A", "revolute", "crank", "arm", (0.0, 0.0))
+    scene = replace(
+        hung(),
+        links=(*hung().links[:2], LinkPlan("arm")),
+        joints=(slide, pin),
+        motors=(MotorPlan("S", 2.0),),
+        forces=(ForcePlan("load", "arm", (0.0, 3.0), (1.0, 0.0)),),
+    )
+    assert [beyond_chains(scene, travel) > 0.0 for travel in (-1.1, -0.9, 4.9, 5.1)] == [True, False, False, True]
+    # the other way round
+    held = replace(scene, joints=(replace(slide, a="crank", b="base"), pin))
+    assert [beyond_chains(held, travel) > 0.0 for travel in (-5.1, -4.9, 0.9, 1.1)] == [True, False, False, True]
+
+
 def test_points_of_one_crank_do_not_get_as_far_together_as_each_alone():
     # pushed to the right at the end and up in the middle: 10 sin θ + 5 (cos θ − 1) is √125 − 5 at most
     pushes = (ForcePlan("load", "crank", (0.0, 10.0), (1.0, 0.0)), ForcePlan("up", "crank", (0.0, 5.0), (0.0, 1.0)))
