@@ -197,7 +197,7 @@ def test_a_point_on_a_hinged_link_in_space_stays_on_a_circle():
 
 def test_a_motor_moves_the_pin_that_a_point_turns_about():
     # a slide takes the pin 2 to the right, the point is 3 off it, drawn above
-    slide = JointPlan("S", "prismatic", "base", "crank", (0.0, 0.0), axis=(1.0, 0.0))
+    slide = JointPlan("S", "prismatic", "base", "crank", (9.0, 0.0), axis=(1.0, 0.0))
     pin = JointPlan("A", "revolute", "crank", "arm", (0.0, 0.0))
     scene = replace(
         hung(),
