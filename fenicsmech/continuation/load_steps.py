@@ -274,7 +274,7 @@ class LoadStepper(Stepper):
                 point = aside.pop(value, None)
                 if point is None:
                     guess = self._last.state if inverts and self._last else self._guess(control.at(value))
-                    point = self._correct(guess, control.at(value), brief=self._straight and self._failed(value, tried))
+                    point = self._correct(guess, control.at(value), brief=self._failed(value, tried) and self._straight)
                 snapped = self._snapped(point)
                 if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
                     step, beyond, halved = 0.5 * (value - self._value), point, True

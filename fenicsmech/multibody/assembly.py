@@ -198,13 +198,14 @@ class Assembler:
 
     def close(self, poses: np.ndarray, motors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gauss–Newton from ``poses``; returns the best poses and their scaled residual."""
-        system, scale = self.system, self.system.row_scale.copy()
-        scale[list(self.soft)] = 0.0
+        system, kept = self.system, np.ones(self.system.rows)
+        kept[list(self.soft)] = 0.0
+        scale = kept * system.row_scale
         residual = scale * system.value(poses, motors)
         for _ in range(25):
             if np.max(np.abs(residual), initial=0.0) <= 1e-15 or not system.rows:
                 break
-            scaled = scale[:, None] * system.gradient(poses, motors) * system.pose_scale
+            scaled = kept[:, None] * system.scaled_gradient(poses, motors)
             step = system.pose_scale * np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
             trial = system.with_unknowns(poses, system.unknowns(poses) + step)
             new = scale * system.value(trial, motors)

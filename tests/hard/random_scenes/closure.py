@@ -127,7 +127,7 @@ class Closure:
         for joint in self.blueprint.joints:
             a, b = (places[i] for i in self.ends[joint.name])
             gap, relative = self.gap(joint, places) / length, a.turn.T @ b.turn
-            lean = [] if dim == 2 else [across @ relative @ _axis(joint) for across in _across(joint)]
+            lean = [] if dim == 2 else [across @ relative @ unit_axis(joint) for across in _across(joint)]
             turned = [b.angle - a.angle]
             if dim == 3:
                 turned = [relative[0, 2], relative[1, 2], 0.5 * (relative[1, 0] - relative[0, 1])]
@@ -148,7 +148,7 @@ class Closure:
         return np.array(rows)
 
 
-def _axis(joint: JointPlan) -> np.ndarray:
+def unit_axis(joint: JointPlan) -> np.ndarray:
     """Unit vector along the axis of a revolute joint in space; z by default."""
     axis = np.array((0.0, 0.0, 1.0) if joint.axis is None else (*joint.axis, 0.0)[:3])
     return axis / np.linalg.norm(axis)
@@ -156,7 +156,7 @@ def _axis(joint: JointPlan) -> np.ndarray:
 
 def _across(joint: JointPlan) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors across the axis, right-handed with it; x and y for z."""
-    axis = _axis(joint)
+    axis = unit_axis(joint)
     start = np.eye(3)[0] if abs(axis[0]) < 0.9 else np.eye(3)[1]
     first = start - (start @ axis) * axis
     first = first / np.linalg.norm(first)

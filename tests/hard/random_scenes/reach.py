@@ -36,7 +36,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from scipy.spatial.transform import Rotation
 
 from .blueprint import Blueprint, CompliancePlan, JointPlan, LinkPlan
-from .closure import Place
+from .closure import Place, unit_axis
 from .potential import Potential
 from .thresholds import THRESHOLDS
 
@@ -75,22 +75,6 @@ class _Chain:
         return complex(direction @ self.arm, direction @ np.cross(self.axis, self.arm))
 
 
-@dataclass(frozen=True)
-class _Motion:
-    """Of a rigid body: x to R x + t."""
-
-    turn: Rotation = field(default_factory=Rotation.identity)
-    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
-
-    def at(self, point: np.ndarray) -> np.ndarray:
-        """Where a point gets."""
-        return self.turn.apply(point) + self.shift
-
-    def after(self, first: _Motion) -> _Motion:
-        """``first``, and then this one."""
-        return _Motion(self.turn * first.turn, self.at(first.shift))
-
-
 def beyond_chains(scene: Blueprint, travel: float) -> float:
     """How far a ``travel`` of the forces' points from the drawn configuration is beyond the reach of rigid links on the
     ground, over the mechanism's length; −∞ where flexible links, slides or joints that give way are in between.
@@ -106,7 +90,7 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
     def chains(link: LinkPlan, point: np.ndarray, passed: tuple[str, ...]) -> Iterator[_Chain]:
         """Those that end at a ``point`` of a link."""
         if link.name in held:
-            yield _Chain(held[link.name].at(point))
+            yield _Chain(_moved(held[link.name], point))
             return
         for joint in stiff:
             pinned = joint.kind != "prismatic" or joint.name in welds
@@ -117,14 +101,14 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
                 if link.centreline and not arm < _WITHIN * radius:
                     continue
                 if other.name in held and joint.kind == "revolute" and joint.name not in welds:
-                    there, axis = held[other.name], _axis(joint)
+                    there, axis = held[other.name], unit_axis(joint)
                     if joint.name in positions:
-                        motion = there.after(_driven(joint, positions[joint.name], onward=other.name == joint.a))
-                        yield _Chain(motion.at(point))
+                        motion = there @ _driven(joint, positions[joint.name], onward=other.name == joint.a)
+                        yield _Chain(_moved(motion, point))
                         continue
                     centre = pin + axis * (axis @ (point - pin))
-                    turned, across = there.turn.apply(axis), there.turn.apply(point - centre)
-                    yield _Chain(there.at(centre), arm=across, axis=turned, hinge=joint.name)
+                    turned, across = there[:3, :3] @ axis, there[:3, :3] @ (point - centre)
+                    yield _Chain(_moved(there, centre), arm=across, axis=turned, hinge=joint.name)
                     continue
                 at, own = (point, 0.0) if joint.name in welds else (pin, arm)
                 for chain in chains(other, at, (*passed, joint.name)):
@@ -146,9 +130,10 @@ def beyond_chains(scene: Blueprint, travel: float) -> float:
     return max(travel - most, least - travel) / scene.length
 
 
-def _held(scene: Blueprint, stiff: Sequence[JointPlan], positions: dict[str, float]) -> dict[str, _Motion]:
-    """Motions of the rigid links that joints and motors hold, one after the other from the ground on."""
-    held = {link.name: _Motion() for link in scene.links if link.fixed}
+def _held(scene: Blueprint, stiff: Sequence[JointPlan], positions: dict[str, float]) -> dict[str, np.ndarray]:
+    """Motions of the rigid links that joints and motors hold, one after the other from the ground on: (4, 4), of
+    homogeneous coordinates."""
+    held = {link.name: np.eye(4) for link in scene.links if link.fixed}
     for _ in scene.links:
         for joint in stiff:
             if joint.kind != "weld" and joint.name not in positions:
@@ -156,22 +141,23 @@ def _held(scene: Blueprint, stiff: Sequence[JointPlan], positions: dict[str, flo
             for base, link in ((joint.a, joint.b), (joint.b, joint.a)):
                 if base in held and link not in held and not scene.link(link).centreline:
                     own = _driven(joint, positions.get(joint.name, 0.0), onward=base == joint.a)
-                    held[link] = held[base].after(own)
+                    held[link] = held[base] @ own
     return held
 
 
-def _driven(joint: JointPlan, position: float, *, onward: bool) -> _Motion:
-    """Of a joint's link b against a, to the ``position`` of its motor; ``onward`` or else of a against b."""
-    way = (position if onward else -position) * _axis(joint)
+def _driven(joint: JointPlan, position: float, *, onward: bool) -> np.ndarray:
+    """Motion of a joint's link b against a, to the ``position`` of its motor; ``onward`` or else of a against b."""
+    motion, way = np.eye(4), (position if onward else -position) * unit_axis(joint)
     if joint.kind == "prismatic":
-        return _Motion(shift=way)
-    turn, pin = Rotation.from_rotvec(way), _in_space(joint.at)
-    return _Motion(turn, pin - turn.apply(pin))
+        motion[:3, 3] = way
+        return motion
+    turn, pin = Rotation.from_rotvec(way).as_matrix(), _in_space(joint.at)
+    motion[:3, :3], motion[:3, 3] = turn, pin - turn @ pin
+    return motion
 
 
-def _axis(joint: JointPlan) -> np.ndarray:
-    axis = _in_space(joint.axis or (0.0, 0.0, 1.0))
-    return axis / np.linalg.norm(axis)
+def _moved(motion: np.ndarray, point: np.ndarray) -> np.ndarray:
+    return motion[:3, :3] @ point + motion[:3, 3]
 
 
 def _in_space(vector: tuple[float, ...]) -> np.ndarray:
