@@ -66,7 +66,8 @@ class ArcSteps:
             corner.
         first_load: force at which a path starts where nothing but loads holds the mechanism, over that at which a
             linear one is at its end.
-        iterations: number per step that step sizes aim at; the last one only determines the stability.
+        iterations: number per step that step sizes aim at; the last one only determines the stability, and one that
+            only shows rounding does not count.
         contact_iterations: the same where other points touch at the end of a step: it hardly depends on its length.
 
     Raises:
@@ -293,7 +294,7 @@ class ArcLengthStepper(Stepper):
                 touched = self._others_touch(point.touching, found.touching)
                 if self._stays_on_path(point, found, turn, touched):
                     iterations = steps.contact_iterations if touched else steps.iterations
-                    growth = min(steps.turn / max(turn, 1e-12), math.sqrt(iterations / found.iterations))
+                    growth = min(steps.turn / max(turn, 1e-12), math.sqrt(iterations / found.contractions))
                     self.length *= min(max(growth, 0.5), 2.0)
                     self._accept(found, self.metric.norm(self.chord(point, found)))
                     return found

@@ -44,9 +44,12 @@ the same on all processes and machines, and not by time:
        to ends
     15. of forces that nothing resists: links move as rigid    four moves, a solve each, from both
        bodies to where loads balance, as at an obstacle: from
-       the rigid pose in which all do, then the last one
+       the rigid pose in which all do, then the last one;
+       after ``failures_falling`` where the first force
+       prefers no pose
     16. of forces beside large reactions: likewise, where       as these
-       motions that deform no link are out of balance
+       motions that deform no link are out of balance; 15
+       where they stay so and nothing else resists
 
 Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
 a dead load the equilibria past a limit point are not those that the mechanism would take.
@@ -98,6 +101,7 @@ class LoadSteps:
         failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
             itself. Those before an equilibrium that was reached do not count.
         failures_held: likewise where joints and motors hold the point that is to move.
+        failures_falling: likewise where links first move as rigid bodies to where something resists.
         failures_hidden: to one value, in a row or not, after which stepping fails where the rounding of stiff links
             hides what resists.
         failures_inverted: steps in a row without equilibrium, of which the last one's prediction inverts elements,
@@ -132,6 +136,7 @@ class LoadSteps:
     motion: float = 0.2
     failures: int = 40
     failures_held: int = 8
+    failures_falling: int = 2
     failures_hidden: int = 3
     failures_inverted: int = 8
     smallest_limited: float = 1e-6
@@ -155,6 +160,7 @@ class LoadSteps:
             "load steps",
             failures=1,
             failures_held=1,
+            failures_falling=1,
             failures_hidden=1,
             failures_inverted=1,
             iterations=1,
@@ -249,8 +255,12 @@ class LoadStepper(Stepper):
         self._rate: Step | None = None  # of the last step, by the control value
         self.iterations = self.snaps = 0
 
-    def advance(self, control: Control) -> EquilibriumPoint:
+    def advance(self, control: Control, *, failures: int | None = None) -> EquilibriumPoint:
         """The equilibrium at ``control``'s prescribed value, reached in as many steps as needed.
+
+        Args:
+            control: with the value.
+            failures: in a row after which stepping fails at once, if fewer than by the options.
 
         Raises:
             LoadStepsFailed: the smallest step failed, or too many.
@@ -259,8 +269,9 @@ class LoadStepper(Stepper):
         if not self._points:
             self._settle(control.at(self._value))
         steps, distance = self._steps, control.prescribed - self._value
+        most = steps.failures if failures is None else min(failures, steps.failures)
         step, tried, failed = distance, list[float](), 0  # failed: steps since the last equilibrium
-        patient = False  # whether a longer solve was tried
+        patient = failures is not None  # whether a longer solve was tried, or is not to be
         inverts = False  # whether predictions do
         beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
         # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
@@ -287,7 +298,7 @@ class LoadStepper(Stepper):
                 inverts |= isinstance(failure, InvertedGuess) and failed >= steps.failures_inverted
                 step = 0.5 * (value - self._value)
                 smallest = steps.smallest if beyond is None else steps.smallest_snap_step
-                ended = abs(step) <= smallest * self._scale(distance) or failed >= steps.failures
+                ended = abs(step) <= smallest * self._scale(distance) or failed >= most
                 hidden = False
                 if len(tried) >= steps.failures_hidden or (ended and beyond is None):
                     hidden = self._plain.hides(self._last.state if self._last else self._start, control.at(self._value))
@@ -308,7 +319,7 @@ class LoadStepper(Stepper):
                     point.control.prescribed,
                 )
             changed = bool(self._points) and self._others_touch(self._points[-1].touching, point.touching)
-            self._accept_at(point)
+            self._accept_at(point, snapped=snapped)
             if self._value == control.prescribed:
                 return point
             failed, beyond = 0, None
@@ -518,23 +529,23 @@ class LoadStepper(Stepper):
         """Distance of ``rate`` to ``point`` from the ``span`` of others, where the motion is independent."""
         return self.system.size(self.system.independent(rate.beyond(span), point.state))
 
-    def _accept_at(self, point: EquilibriumPoint) -> None:
-        """Keeps ``point``, at the value of its control."""
-        self._accept(point, point.control.prescribed - self._value)
+    def _accept_at(self, point: EquilibriumPoint, *, snapped: bool = False) -> None:
+        """Keeps ``point``, at the value of its control, and the one before unless that is on another path."""
+        self._accept(point, 0.0 if snapped else point.control.prescribed - self._value)
         self._value = point.control.prescribed
 
 
 class DeadCentreStepper(LoadStepper):
     """Load steps of motors or constant loads, also past a dead centre that the mechanism reaches without strain."""
 
-    def advance(self, control: Control) -> EquilibriumPoint:
+    def advance(self, control: Control, *, failures: int | None = None) -> EquilibriumPoint:
         try:
-            return super().advance(control)
+            return super().advance(control, failures=failures)
         except LoadStepsFailed as failure:
             last = None if failure.hidden else failure.last
             if last is None or not self._pass_dead_centre(last, failure.tried[-1], control):
                 raise
-        return super().advance(control)
+        return super().advance(control, failures=failures)
 
     def _pass_dead_centre(self, last: EquilibriumPoint, tried: float, control: Control) -> bool:
         """Continues from the ``last`` equilibrium by straining links, past a dead centre before the value that was

@@ -30,6 +30,7 @@ from fenicsmech.errors import OutOfMemoryError
 
 _ACCURACY = 1e-10  # relative error that iterative solvers may leave
 _LOST = 1e-2  # likewise of a solution, from which on it counts as rounding
+_BACKWARD = 1e-13  # |K x − b| over |K| |x| + |b| above which a factor is inaccurate; it is about 1e-17 otherwise
 
 
 @dataclass(frozen=True)
@@ -113,13 +114,13 @@ class Factor(LinearSolver):
     remedy = "Use larger elements, or more memory"
 
     def __init__(self, matrix: PETSc.Mat, workspace: int = 60) -> None:
-        self._matrix, self._workspace, self._fresh = matrix, workspace, True
+        self._matrix, self._workspace, self._factored = matrix, workspace, 0  # factored so often since the analysis
         self._solver = PETSc.KSP()
         self._analyse()
 
     def refactor(self) -> bool:
         status = self._numeric()
-        if not self._fresh and not (status >= 0 and self.inertia().zero == 0):
+        if self._factored > 1 and not (status >= 0 and self.inertia().zero == 0):
             # the analysis pairs unknowns by their present values: in later ones a pair may be zero, the matrix regular
             self._analyse()
             status = self._numeric()
@@ -130,7 +131,6 @@ class Factor(LinearSolver):
             self._workspace = 2 * self._workspace + 100
             self._analyse()
             status = self._numeric()
-        self._fresh = False
         if status in _OUT_OF_MEMORY:
             raise OutOfMemoryError(
                 f"factor of a matrix of {self._matrix.size[0]} unknowns",
@@ -155,13 +155,14 @@ class Factor(LinearSolver):
         pc.setType(PETSc.PC.Type.CHOLESKY)
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         self._solver.setFromOptions()
-        self._fresh = True
+        self._factored = 0
 
     def _numeric(self) -> int:
         """Factors the present values; INFOG(1) of MUMPS, the same on all ranks, negative where that failed."""
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self._solver.setOperators(self._matrix)
         self._solver.getPC().setUp()
+        self._factored += 1
         return self._solver.getPC().getFactorMatrix().getMumpsInfog(1)
 
     def inertia(self) -> Inertia:
@@ -174,9 +175,28 @@ class Factor(LinearSolver):
         return 1e6 * self._solver.getPC().getFactorMatrix().getMumpsInfog(22)
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec, tolerance: float = 0.0) -> bool:
-        """Solves with the last factor, always to roundoff."""
+        """Solves with the last factor, to its roundoff."""
         self._solver.solve(right, solution)
         return True
+
+    def solve_and_count(self, right, solution, tolerance):
+        """Likewise, by another analysis where the factor is inaccurate: the one of earlier values scales and pairs
+        unknowns by these."""
+        self.solve(right, solution)
+        if self._factored > 1 and not self._is_accurate(right, solution):
+            self._analyse()
+            if not self.refactor():
+                return None
+            self.solve(right, solution)
+        return self.inertia()
+
+    def _is_accurate(self, right: PETSc.Vec, solution: PETSc.Vec) -> bool:
+        """Whether |K x − b| ≤ 1e-13 (|K| |x| + |b|)."""
+        left = right.duplicate()
+        self._matrix.mult(solution, left)
+        left.axpy(-1.0, right)
+        size = self._matrix.norm(PETSc.NormType.FROBENIUS) * solution.norm() + right.norm()
+        return left.norm() <= _BACKWARD * size
 
 
 class _KktFactor(Factor):
@@ -247,6 +267,13 @@ class EquilibriumPoint:
         """The same number with the controlled quantity held; along a path, the displacement of the force's point."""
         return self.stability.under(self.control)
 
+    @property
+    def contractions(self) -> int:
+        """Number of iterations but for a last one that lowers the residual to no less than a quarter: it only shows
+        that this is rounding."""
+        idle = len(self.residuals) > 1 and self.residuals[-1] > 0.25 * self.residuals[-2]
+        return max(self.iterations - int(idle), 1)
+
     def scaled(self, factor: float) -> EquilibriumPoint:
         """The same equilibrium with ``factor`` times its tangent."""
         return replace(self, tangent=self.tangent.scaled(factor), conjugate_rate=factor * self.conjugate_rate)
@@ -290,10 +317,13 @@ class Linearisation:
 
         or leaves a pivot that counts as zero.
         """
-        x = self.rate()
-        if self._linear.inertia().zero > 0:
+        right = self.control_rate()
+        x, image = right.duplicate(), right.duplicate()
+        inertia = self._linear.solve_and_count(right, x, _ACCURACY)
+        if inertia is None:
+            raise NotConverged("the linear solver stalled")
+        if inertia.zero > 0:
             return True
-        image = x.duplicate()
         self._system.kkt.matrix().mult(x, image)
         lost = self.solve(image) - x
         return not lost.norm() <= _LOST * x.norm()

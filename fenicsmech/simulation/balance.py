@@ -8,8 +8,9 @@ position out of balance, all links move along such motions m alone to where the 
     q ← q − |H|⁻¹ w,     w_i = ∇(V + E_effects − loads) · m_i,     H = ∂w/∂q,
 
 V the potentials of poses and of joints that give way, H by differences, along those motions of the moved links that are
-nearest to the ones before; |H|, which descends, has the moduli of its eigenvalues. From an unstable equilibrium H leads
-to the one near.
+nearest to the ones before; |H|, which descends, has the moduli of its eigenvalues. A step δ that descends ends where
+the work along it vanishes, w(q + t δ) · δ = 0: obstacles resist only where links touch them. From an unstable
+equilibrium H leads to the one near.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ _BALANCED = 1e-6  # work over loads times the greatest velocity that is small
 _DIFFERENCE = 1e-4  # rad, or over the mechanism's length, by which links move for the slopes of works
 _LARGEST = 0.1  # likewise in one step
 _ITERATIONS = 10  # to vanishing works
+_TRIALS = 40  # of the length of one step
+_ROUNDED = 1e-14  # motion, rad or over the mechanism's length, that moves nothing
 _FELT = 1e-12  # slope over the largest
 _MOVED = 1e-6  # travel over the mechanism's length, per motion, above which a force works
 _ROUNDS = 4  # of moving links and relaxing them
@@ -126,8 +129,10 @@ class Balance:
             slopes = np.array([self._slope(state, control, motions, works, k) for k in range(len(motions))])
             # of one process: signs of slopes are decisions that depend on rounding
             q = from_one(self._comm, partial(_newton_step, slopes, works, descend))
-            state = self._moved(state, motions, q * min(1.0, _LARGEST / max(np.abs(q).max(), _LARGEST)))
-            if self.imbalance(state, control) <= 1e-3 * _BALANCED:
+            q *= min(1.0, _LARGEST / max(np.abs(q).max(initial=0.0), _LARGEST))
+            length = self._length(state, control, motions, works, q) if descend else 1.0
+            state = self._moved(state, motions, length * q)
+            if length * np.abs(q).max(initial=0.0) <= _ROUNDED or self.imbalance(state, control) <= 1e-3 * _BALANCED:
                 break
         return state
 
@@ -135,13 +140,45 @@ class Balance:
         self, state: State, control: Control, motions: Sequence[Motion], works: np.ndarray, k: int
     ) -> np.ndarray:
         """∂w/∂q_k of ``works`` w along ``motions``, (motions,); zero where no link can move so, as in a dead centre."""
-        there = self._moved(state, [motions[k]], np.array([_DIFFERENCE]))
+        q = np.zeros(len(motions))
+        q[k] = _DIFFERENCE
+        there = self._works_after(state, control, motions, q)
+        return np.zeros(len(works)) if there is None else (there - works) / _DIFFERENCE
+
+    def _works_after(
+        self, state: State, control: Control, motions: Sequence[Motion], q: np.ndarray
+    ) -> np.ndarray | None:
+        """Works after links have moved by ``q``, along those motions there that are nearest to ``motions``, (motions,);
+        None where no link can move."""
+        there = self._moved(state, motions, q)
         moved, scale = self._motions(there), self._solver.system.joints.pose_scale
         if not moved:
-            return np.zeros(len(works))
+            return None
         own, wanted = (np.column_stack([motion.z / scale for motion in each]) for each in (moved, motions))
         nearest = from_one(self._comm, lambda: np.linalg.lstsq(own, wanted, rcond=None)[0]).T
-        return (nearest @ self._works(there, control, moved) - works) / _DIFFERENCE
+        return nearest @ self._works(there, control, moved)
+
+    def _length(
+        self, state: State, control: Control, motions: Sequence[Motion], works: np.ndarray, q: np.ndarray
+    ) -> float:
+        """The part t of a step that descends after which the work along it vanishes: all of it where that does not, or
+        by bisection."""
+
+        def along(t: float) -> float:
+            there = self._works_after(state, control, motions, t * q)
+            return 0.0 if there is None else agreed(self._comm, float(there @ q))
+
+        start, end = agreed(self._comm, float(works @ q)), along(1.0)
+        if not start < 0.0 < end:
+            return 1.0
+        low, high = 0.0, 1.0
+        for _ in range(_TRIALS):
+            t = 0.5 * (low + high)
+            work = along(t)
+            if abs(work) <= _BALANCED * abs(start):
+                break
+            low, high = (t, high) if work < 0.0 else (low, t)
+        return t
 
     def _motions(self, state: State) -> list[Motion]:
         """Those that deform no link and open no joint but one that gives way, on all processes the same basis."""

@@ -148,12 +148,13 @@ class CurveStepper:
         """The equilibrium under ``control``."""
         if control.constrained:
             control = control.at(control.prescribed + self.origin)
-        steps = self.start(control).steps
+        start = self.start(control)
+        steps = start.steps
         iterations, snaps = steps.iterations, steps.snaps
         with self._timed():
             try:
                 with self.keeping_frames():
-                    point = steps.advance(control)
+                    point = self._fallen(start, control) if self._falls(start, control) else steps.advance(control)
             except LoadStepsFailed as failure:
                 # the first value was sought from rest
                 found = self._from_rest(control) if steps.snaps and iterations and not failure.hidden else None
@@ -170,6 +171,9 @@ class CurveStepper:
                 else:
                     point, imbalance, spent = balance.improved(point, control)
                     self._effort += Effort(spent)
+                    if imbalance > _LOST and self.adrift and (found := self._reached(control, point)) is not None:
+                        point, imbalance, spent = balance.improved(found, control)
+                        self._effort += Effort(spent)
             record = self.record(point)
             if imbalance > _LOST:
                 names = ", ".join(map(repr, self.freedom.mobile))
@@ -204,6 +208,19 @@ class CurveStepper:
         self._effort += Effort(stepper.iterations, stepper.snaps + 1)
         self._start = replace(start, steps=stepper)
         return point
+
+    def _falls(self, start: CurveStart, control: Control) -> bool:
+        """Whether links move as rigid bodies before anything resists the first force, which prefers no pose."""
+        if not self.adrift or control.constrained or not control.prescribed or start.rest.loads_resist:
+            return False
+        return not start.steps.iterations and not any(frame.force for frame in self.frames)
+
+    def _fallen(self, start: CurveStart, control: Control) -> EquilibriumPoint:
+        """The equilibrium of load steps, or that which links reach as rigid bodies once a few of them have failed."""
+        try:
+            return start.steps.advance(control, failures=LoadSteps().failures_falling)
+        except LoadStepsFailed as failure:
+            return self._reached(control, failure.last) or start.steps.advance(control)
 
     def _reached(self, control: Control, last: EquilibriumPoint | None) -> EquilibriumPoint | None:
         """The equilibrium that links reach as rigid bodies: in the pose in which all loads balance, or from the last

@@ -245,7 +245,7 @@ def test_an_arm_that_nothing_resists_gets_to_a_table_as_a_rigid_body_where_load_
     simulation = fm.Simulation(scene, space="plane-stress", size=2.5, comm=MPI.COMM_SELF)
     (stepped,) = simulation.load_displacement(push, forces=[1e-5]).frames
 
-    def advance(self, control):
+    def advance(self, control, **options):
         raise LoadStepsFailed(None, 0.0, "refused", (control.prescribed,))
 
     monkeypatch.setattr(LoadStepper, "advance", advance)
@@ -264,11 +264,11 @@ def test_an_arm_turns_over_against_a_small_constant_load_where_load_steps_fail(m
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=2.5, comm=MPI.COMM_SELF)
     advance, refused = LoadStepper.advance, []
 
-    def refuse(self, control):
+    def refuse(self, control, **options):
         if control.prescribed == 1e-4 and not refused:
             refused.append(control.prescribed)
             raise LoadStepsFailed(None, 0.0, "refused", (control.prescribed,))
-        return advance(self, control)
+        return advance(self, control, **options)
 
     monkeypatch.setattr(LoadStepper, "advance", refuse)
     up, higher = simulation.load_displacement(push, forces=[1e-4, 2e-4], others={weight: 1e-8}).frames
@@ -311,7 +311,7 @@ def refuse(monkeypatch, reached: float = 0.0) -> list[float]:
     for."""
     asked = []
 
-    def advance(self, control):
+    def advance(self, control, **options):
         asked.append(control.prescribed)
         raise LoadStepsFailed(None, reached, "refused", (control.prescribed,))
 

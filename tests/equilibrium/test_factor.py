@@ -55,6 +55,21 @@ def test_new_values_of_the_same_matrix_are_factored_again():
 
 
 @pytest.mark.parallel
+def test_factor_that_is_not_that_of_the_matrix_is_made_again():
+    matrix = distributed(with_eigenvalues(np.linspace(0.5, 2.0, SIZE)), MPI.COMM_WORLD)
+    factor = Factor(matrix)
+    for _ in range(2):
+        matrix.scale(1.1)
+        assert factor.refactor()
+    matrix.shift(-3.0)
+    right, solution = matrix.createVecs()
+    right.set(1.0)
+    inertia = factor.solve_and_count(right, solution, 0.0)
+    assert (inertia.negative, inertia.zero) == (SIZE, 0)
+    assert (matrix * solution - right).norm() <= 1e-12 * right.norm()
+
+
+@pytest.mark.parallel
 def test_zero_pivots_are_found_instead_of_failing():
     # two rows of zeros, as an unused multiplier or a freedom without stiffness leaves them
     dense = np.zeros((SIZE + 2, SIZE + 2))
