@@ -28,7 +28,7 @@ the same on all processes and machines, and not by time:
     8. the nearest equilibrium found past a fold, a snap; or   one; or one solve ``snap_iterations`` times as long
        where no fold is seen, that of a longer solve
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
-       beyond a dead centre                                    not; then load steps once more
+       beyond a dead centre (``dead_centre``)                  not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
        may have left at a corner
     11. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
@@ -53,26 +53,12 @@ the same on all processes and machines, and not by time:
 
 Then the last equilibrium and the values without one are reported. The control stays the one that was asked for: under
 a dead load the equilibria past a limit point are not those that the mechanism would take.
-
-Motors, and springs that constant loads wind up, may go beyond a dead centre, where the slack of the joints ends and
-links must strain. Towards it a coordinate x moves ever faster while the links are free of strain: close by, in units
-of x,
-
-    C = b + ½ x² − e = 0,     E = ½ k e²,     λ = k e,     x λ = 0,
-
-e the strain and b how far these are beyond the dead centre. Before it (b < 0) joints close by x alone, x = √(−2b)
-and λ = 0; beyond it x = 0 and λ = k b. Newton's method does not get from one to the other: as long as λ = 0 the energy
-is not curved along x, every step closes the joints by x alone, x ← ½ x − b / x, and for b > 0 these oscillate without
-end. From a state in which links strain instead, it converges, with λ as the curvature. Such states lie along the rate
-with x held:
-
-    K ẏ = r,     K w = n,     ẏ ← ẏ − w (n · ẏ) / (n · w),     n the motion in ẏ, which is all x near the dead centre.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from fenicsmech.collective import agreed
 from fenicsmech.continuation.stepper import Predictor, Stepper, TangentPredictor
@@ -221,6 +207,37 @@ class LoadStepsFailed(Exception):
         self.fold, self.hidden, self.straight = fold, hidden, straight
 
 
+@dataclass
+class _Way:
+    """Load steps on the way to one prescribed value.
+
+    Attributes:
+        control: with the value.
+        distance: of it from where the way begins.
+        step: the next one.
+        most: failures in a row after which stepping fails.
+        patient: whether a longer solve was tried, or is not to be.
+        failed: steps since the last equilibrium.
+        tried: values without one.
+        inverts: whether predictions invert elements.
+        beyond: the nearest equilibrium that was found past a fold.
+        aside: under contact, where kinks look like snaps, equilibria beyond, by their values.
+        halved: whether steps were.
+    """
+
+    control: Control
+    distance: float
+    step: float
+    most: int
+    patient: bool
+    failed: int = 0
+    tried: list[float] = field(default_factory=list)
+    inverts: bool = False
+    beyond: EquilibriumPoint | None = None
+    aside: dict[float, EquilibriumPoint] = field(default_factory=dict)
+    halved: bool = False
+
+
 class LoadStepper(Stepper):
     """Follows equilibria as the prescribed value of one control changes.
 
@@ -268,48 +285,11 @@ class LoadStepper(Stepper):
         """
         if not self._points:
             self._settle(control.at(self._value))
-        steps, distance = self._steps, control.prescribed - self._value
-        most = steps.failures if failures is None else min(failures, steps.failures)
-        step, tried, failed = distance, list[float](), 0  # failed: steps since the last equilibrium
-        patient = failures is not None  # whether a longer solve was tried, or is not to be
-        inverts = False  # whether predictions do
-        beyond: EquilibriumPoint | None = None  # the nearest one that was found past a fold
-        # under contact, where kinks look like snaps: equilibria set aside, by their values; whether steps were halved
-        aside, halved = dict[float, EquilibriumPoint](), False
+        distance = control.prescribed - self._value
+        most = self._steps.failures if failures is None else min(failures, self._steps.failures)
+        way = _Way(control, distance, step=distance, most=most, patient=failures is not None)
         while True:
-            remaining = control.prescribed - self._value
-            step = self._limited(step, distance)
-            arrives = abs(step) >= abs(remaining) * (1.0 - 1e-9)
-            value = control.prescribed if arrives else self._value + step
-            try:
-                point = aside.pop(value, None)
-                if point is None:
-                    guess = self._last.state if inverts and self._last else self._guess(control.at(value))
-                    point = self._correct(guess, control.at(value), brief=self._failed(value, tried) and self._straight)
-                snapped = self._snapped(point)
-                if snapped and abs(value - self._value) > steps.smallest_snap_step * self._scale(distance):
-                    step, beyond, halved = 0.5 * (value - self._value), point, True
-                    if self.system.contact is not None:
-                        aside[value] = point
-                    continue
-            except NotConverged as failure:
-                tried.append(value)
-                failed, halved = failed + 1, True
-                inverts |= isinstance(failure, InvertedGuess) and failed >= steps.failures_inverted
-                step = 0.5 * (value - self._value)
-                smallest = steps.smallest if beyond is None else steps.smallest_snap_step
-                ended = abs(step) <= smallest * self._scale(distance) or failed >= most
-                hidden = False
-                if len(tried) >= steps.failures_hidden or (ended and beyond is None):
-                    hidden = self._plain.hides(self._last.state if self._last else self._start, control.at(self._value))
-                if not (ended or hidden):
-                    continue
-                if beyond is not None:
-                    point, snapped = beyond, True
-                else:
-                    point = self._beyond_steps(control.at(value), failure, tried, hidden, longer=not patient)
-                    snapped, patient = self._snapped(point), True
-                step = point.control.prescribed - self._value
+            point, snapped = self._next(way)
             if snapped:
                 self.snaps += 1
                 self._rate = None
@@ -319,14 +299,70 @@ class LoadStepper(Stepper):
                     point.control.prescribed,
                 )
             changed = bool(self._points) and self._others_touch(self._points[-1].touching, point.touching)
+            way.step = point.control.prescribed - self._value
             self._accept_at(point, snapped=snapped)
             if self._value == control.prescribed:
                 return point
-            failed, beyond = 0, None
-            if changed and not halved:
-                step = control.prescribed - self._value
-            elif point.iterations <= steps.iterations:
-                step *= 2.0
+            way.failed, way.beyond = 0, None
+            if changed and not way.halved:
+                way.step = control.prescribed - self._value
+            elif point.iterations <= self._steps.iterations:
+                way.step *= 2.0
+
+    def _next(self, way: _Way) -> tuple[EquilibriumPoint, bool]:
+        """The next equilibrium on the way, and whether it is beyond a snap.
+
+        Raises:
+            LoadStepsFailed: the smallest step failed, or too many.
+        """
+        while True:
+            value = self._value_ahead(way)
+            control = way.control.at(value)
+            try:
+                point = way.aside.pop(value, None) or self._tried(way, control)
+                snapped = self._snapped(point)
+            except NotConverged as failure:
+                if (found := self._after(way, control, failure)) is None:
+                    continue
+                return found, found is way.beyond or self._snapped(found)
+            if not snapped or abs(value - self._value) <= self._steps.smallest_snap_step * self._scale(way.distance):
+                return point, snapped
+            way.step, way.beyond, way.halved = 0.5 * (value - self._value), point, True
+            if self.system.contact is not None:
+                way.aside[value] = point
+
+    def _value_ahead(self, way: _Way) -> float:
+        """The value a step ahead, the prescribed one if that is no farther."""
+        remaining = way.control.prescribed - self._value
+        step = self._limited(way.step, way.distance)
+        return way.control.prescribed if abs(step) >= abs(remaining) * (1.0 - 1e-9) else self._value + step
+
+    def _tried(self, way: _Way, control: Control) -> EquilibriumPoint:
+        """The equilibrium at the value of ``control``, from a prediction."""
+        guess = self._last.state if way.inverts and self._last else self._guess(control)
+        return self._correct(guess, control, brief=self._failed(control.prescribed, way.tried) and self._straight)
+
+    def _after(self, way: _Way, control: Control, failure: NotConverged) -> EquilibriumPoint | None:
+        """The equilibrium taken where the value of ``control`` has none, once steps are not halved any more; else None.
+
+        Raises:
+            LoadStepsFailed: there is none.
+        """
+        steps, step = self._steps, 0.5 * (control.prescribed - self._value)
+        way.tried.append(control.prescribed)
+        way.failed, way.halved, way.step = way.failed + 1, True, step
+        way.inverts |= isinstance(failure, InvertedGuess) and way.failed >= steps.failures_inverted
+        smallest = steps.smallest if way.beyond is None else steps.smallest_snap_step
+        ended = abs(step) <= smallest * self._scale(way.distance) or way.failed >= way.most
+        hidden = False
+        if len(way.tried) >= steps.failures_hidden or (ended and way.beyond is None):
+            hidden = self._plain.hides(self._last.state if self._last else self._start, control.at(self._value))
+        if not (ended or hidden):
+            return None
+        if way.beyond is not None:
+            return way.beyond
+        longer, way.patient = not way.patient, True
+        return self._beyond_steps(control, failure, way.tried, hidden, longer=longer)
 
     @property
     def _last(self) -> EquilibriumPoint | None:
@@ -533,75 +569,3 @@ class LoadStepper(Stepper):
         """Keeps ``point``, at the value of its control, and the one before unless that is on another path."""
         self._accept(point, 0.0 if snapped else point.control.prescribed - self._value)
         self._value = point.control.prescribed
-
-
-class DeadCentreStepper(LoadStepper):
-    """Load steps of motors or constant loads, also past a dead centre that the mechanism reaches without strain."""
-
-    def advance(self, control: Control, *, failures: int | None = None) -> EquilibriumPoint:
-        try:
-            return super().advance(control, failures=failures)
-        except LoadStepsFailed as failure:
-            last = None if failure.hidden else failure.last
-            if last is None or not self._pass_dead_centre(last, failure.tried[-1], control):
-                raise
-        return super().advance(control, failures=failures)
-
-    def _pass_dead_centre(self, last: EquilibriumPoint, tried: float, control: Control) -> bool:
-        """Continues from the ``last`` equilibrium by straining links, past a dead centre before the value that was
-        ``tried``; whether this succeeded."""
-        system, steps, distance = self.system, self._steps, control.prescribed - self._value
-        closing = 2.0 * system.size(last.tangent) * abs(tried - self._value)
-        try:
-            rate = self._straining_rate(last, control.at(self._value))
-        except NotConverged:
-            return False
-        step = distance * min(1.0, steps.motion / max(system.size(rate) * abs(distance), steps.motion))
-        found = False  # an equilibrium, farther off
-        while abs(step) > steps.smallest * self._scale(distance):
-            guess = system.moved(last.state, rate.scaled(step))
-            try:
-                point = self._shifted(guess, control.at(self._value + step))
-            except NotConverged:
-                if found:  # nearer by it would be too
-                    return False
-            else:
-                found = True
-                if not self._left_path(last, rate, step, point, closing):
-                    _log.info("links strain beyond a dead centre near %g", self._value)
-                    self._rate, self._points, self._start = None, [], last.state
-                    self._accept_at(point)
-                    return True
-            step *= 0.5
-        return False
-
-    def _left_path(
-        self, last: EquilibriumPoint, straining: Step, step: float, point: EquilibriumPoint, closing: float
-    ) -> bool:
-        """Whether a coordinate's rate over ``step`` lies outside the range of the ``straining`` one and the tangent at
-        its end by more than joints move while they are ``closing``.
-
-        x = √(2 (p − v)) before a dead centre at p has the rate x′ = −1 / x and closes by x = 2 |x′| (p − v).
-        """
-        rate = self.system.difference(point.state, last.state).scaled(1.0 / step)
-        largest = max(self.system.size(straining), self.system.size(point.tangent))
-        beyond = self._beyond(rate, (straining, point.tangent), point)
-        return beyond > self._steps.deviation * largest + closing / abs(step)
-
-    def _straining_rate(self, last: EquilibriumPoint, control: Control) -> Step:
-        """Rate of the state with the value of ``control`` that strains links instead of the dominant motion x.
-
-        Raises:
-            NotConverged: the KKT matrix cannot be factored or solved with, or is not positive along the motion.
-        """
-        at = self.solver.linearise(last.state, control)
-        rate = at.rate()
-        motion = rate.duplicate()
-        motion.pointwiseMult(self.system.unknowns.coordinates_mask(), rate)
-        motion.normalize()
-        strain = at.solve(motion)
-        compliance = motion.dot(strain)
-        if not compliance > 0.0:
-            raise NotConverged("nothing resists the motion towards a dead centre")
-        rate.axpy(-motion.dot(rate) / compliance, strain)
-        return at.step(rate)

@@ -217,14 +217,15 @@ class CurveFollower:
 
     def from_rest(self, watch: Callable[[int], None]) -> FollowedCurve:
         """The curve from the configuration without the controlled force; ``watch`` gets the number of frames so far."""
-        self._frames.append(self._stepper.frame(LoadControl(0.0)))
+        rest = self._stepper.frame(LoadControl(0.0))
+        self._frames.append(rest)
         try:
-            state = self._frames[0].state
+            state = rest.state
             if self._drifts:
-                state = self._stepper.start(LoadControl(self._sense())).state
-                if free := self._within(self._conjugate(state)):
-                    return self._moved_freely(free, watch)
-                self._frames.append(self._first_loaded(state))
+                state = self._stepper.start(LoadControl(self._sense(rest))).state
+                if free := self._within(self._conjugate(state), rest):
+                    return self._moved_freely(free, rest, watch)
+                self._frames.append(self._first_loaded(state, rest))
                 state = self._frames[-1].state
             path = self._path(state)
         except NotConverged as failure:
@@ -241,24 +242,29 @@ class CurveFollower:
         """Whether nothing but loads holds the mechanism, and a force is followed."""
         return self._stepper.adrift and not self._followed.displaces
 
-    def _sense(self) -> float:
-        """Sign of the force towards the first displacement that is wanted, or else the first force."""
-        return next((end for end in (*self._until.displacements, *self._until.forces) if end), 1.0)
+    def _sense(self, rest: Frame) -> float:
+        """Sign of the force from ``rest`` towards the first displacement that is wanted, or else the first force."""
+        ways = (end - rest.displacement for end in self._until.displacements if end)
+        return next((end for end in (*ways, *self._until.forces) if end), 1.0)
 
-    def _within(self, travel: float) -> tuple[float, ...]:
-        """The wanted displacements that the point reaches without a force, which moves freely as far as ``travel``."""
-        free = abs(travel) + RestSearch().near * self._system.joints.length
-        return tuple(end for end in self._until.displacements if end * travel > 0.0 and abs(end) <= free)
+    def _within(self, travel: float, rest: Frame) -> tuple[float, ...]:
+        """The wanted displacements that the point reaches without a force, which moves freely from ``rest`` as far as
+        ``travel``: constant loads that have taken it there would resist on the way back."""
+        way = travel - rest.displacement
+        free = abs(way) + RestSearch().near * self._system.joints.length
+        ends = ((end, end - rest.displacement) for end in self._until.displacements)
+        return tuple(end for end, ahead in ends if ahead * way > 0.0 and abs(ahead) <= free)
 
-    def _moved_freely(self, ends: Sequence[float], watch: Callable[[int], None]) -> FollowedCurve:
-        """The curve on which nothing resists, until the first of ``ends``."""
-        stepper = self._stepper
-        controls = (DisplacementControl(0.0), DisplacementControl(min(ends, key=abs)))
+    def _moved_freely(self, ends: Sequence[float], rest: Frame, watch: Callable[[int], None]) -> FollowedCurve:
+        """The curve from ``rest`` on which nothing resists, until the first of ``ends``."""
+        stepper, begin = self._stepper, rest.displacement
+        first = min(ends, key=lambda end: abs(end - begin))
+        controls = (DisplacementControl(begin), DisplacementControl(first))
         moved = CurveStepper(stepper.discretisation, replace(stepper.request, controls=controls))
         return self._curve(moved.curve(watch).frames)
 
-    def _first_loaded(self, state: State) -> Frame:
-        """An equilibrium near ``state``, at rest without the force, under a small part of that at the path's end."""
+    def _first_loaded(self, state: State, rest: Frame) -> Frame:
+        """An equilibrium near ``state``, under a small part of the force at the path's end; ``rest`` is without it."""
         reach, conjugate = self._changes(state)
         if conjugate:
             point = equilibrium_at(self._stepper.solver, self._followed, state)
@@ -268,7 +274,7 @@ class CurveFollower:
             reach = linear_reach(point, value=reach, conjugate=conjugate) if moves else 0.0
         if not 0.0 < reach < math.inf:
             raise NotConverged(f"it moves nothing beyond displacement {self._conjugate(state):g}, where travel ends")
-        least = math.copysign(self._steps.first_load * reach, self._sense())
+        least = math.copysign(self._steps.first_load * reach, self._sense(rest))
         try:
             return self._stepper.frame(LoadControl(least))
         except EquilibriumError as lost:  # in rounding
@@ -283,7 +289,7 @@ class CurveFollower:
         self._frames.append(event.frame)
         try:
             if self._drifts:
-                rest = self._first_loaded(self._stepper.start(LoadControl(self._sense())).state)
+                rest = self._first_loaded(self._stepper.start(LoadControl(self._sense(rest))).state, rest)
             path = self._path(rest.state)
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
