@@ -403,6 +403,17 @@ def test_rod_stops_at_a_wall_that_the_points_of_some_ranks_meet():
     assert frame.displacement == pytest.approx(same.displacement, rel=1e-8)
 
 
+def test_path_of_a_rod_that_gravity_has_swung_aside_begins_there_and_works_against_it():
+    simulation, pull = pendulum((1, 0), fm.Gravity((98.1, 98.1)))
+    end = 0.5 * LENGTH
+    followed = simulation.follow(pull, until=fm.Until(displacement=end))
+    assert followed.displacements[0] == pytest.approx(LENGTH * math.sqrt(0.5), rel=1e-3)
+    assert followed.displacements[-1] == pytest.approx(end)
+    # weight along x and y, half of it at the end, with the force there: the rod is in line with their sum
+    half = 0.5 * 1e-6 * 98.1 * LENGTH * WIDTH * DEPTH
+    assert followed.forces[-1] == pytest.approx(half * (end / math.sqrt(LENGTH**2 - end**2) - 1.0), rel=5e-3)
+
+
 @pytest.mark.parametrize("end", [fm.Until(force=1e-2), fm.Until(displacement=19.15)], ids=["force", "displacement"])
 def test_path_of_a_rod_that_meets_a_wall_on_its_way_starts_there(end):
     simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
