@@ -319,7 +319,8 @@ class Linearisation:
         """
         right = self.control_rate()
         x, image = right.duplicate(), right.duplicate()
-        inertia = self._linear.solve_and_count(right, x, _ACCURACY)
+        with self._system.clock.phase("solve"):
+            inertia = self._linear.solve_and_count(right, x, _ACCURACY)
         if inertia is None:
             raise NotConverged("the linear solver stalled")
         if inertia.zero > 0:

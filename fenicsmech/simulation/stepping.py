@@ -108,10 +108,10 @@ class CurveStepper:
         self._system.load(state)
         resist = (rest.loads_resist and not rest.reached) or self._springs_below_rounding
         steps = LoadSteps()
+        if control.constrained and self._springs_below_rounding:
+            steps = replace(steps, failures=steps.failures_hidden)
         if self.freedom.mobility:  # loads balance along motions that deform no link, whatever is hidden
             steps = replace(steps, failures_hidden=steps.failures)
-        if control.constrained and self._springs_below_rounding:
-            steps = replace(steps, failures=LoadSteps.failures_hidden)
         shifts = steps.least_shifts(state.minimum_shift, loads_resist=resist)
         kind = DisplacementControl() if control.constrained else LoadControl()
         if control.constrained and from_one(self.discretisation.comm, lambda: self._is_held(state)):
