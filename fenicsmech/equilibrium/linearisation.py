@@ -300,6 +300,16 @@ class Linearisation:
                 raise NotConverged("the linear solver stalled")
         return x
 
+    def _counted(self, right: PETSc.Vec, tolerance: float, iterations: int = 0) -> tuple[PETSc.Vec, Inertia]:
+        """x with K x = ``right``, and the inertia of K; raises as ``solve``."""
+        self._check()
+        x = right.duplicate()
+        with self._system.clock.phase("solve"):
+            inertia = self._linear.solve_and_count(right, x, tolerance)
+        if inertia is None:
+            raise NotConverged("the linear solver stalled", iterations)
+        return x, inertia
+
     def rate(self) -> PETSc.Vec:
         """x′ of the scaled unknowns x with the control's value."""
         return self.solve(self.control_rate())
@@ -317,14 +327,10 @@ class Linearisation:
 
         or leaves a pivot that counts as zero.
         """
-        right = self.control_rate()
-        x, image = right.duplicate(), right.duplicate()
-        with self._system.clock.phase("solve"):
-            inertia = self._linear.solve_and_count(right, x, _ACCURACY)
-        if inertia is None:
-            raise NotConverged("the linear solver stalled")
+        x, inertia = self._counted(self.control_rate(), _ACCURACY)
         if inertia.zero > 0:
             return True
+        image = x.duplicate()
         self._system.kkt.matrix().mult(x, image)
         lost = self.solve(image) - x
         return not lost.norm() <= _LOST * x.norm()
@@ -339,16 +345,11 @@ class Linearisation:
 
         Its multipliers contain no self-stress: that is due to rounding, and predictions would amplify it.
         """
-        self._check()
         self._turn()
         system, control = self._system, self.control
         destroy_garbage(system.comm)
         right = control.rate(system, self.state)
-        x = right.duplicate()
-        with system.clock.phase("solve"):
-            inertia = self._linear.solve_and_count(right, x, tolerance)
-        if inertia is None:
-            raise NotConverged("the linear solver stalled", iterations)
+        x, inertia = self._counted(right, tolerance, iterations)
         tangent, rate = control.rates(system, right, x)
         stability = control.stability(inertia.negative - system.negative_where_stable, tangent, rate)
         unstable = stability.under(control) > 0
