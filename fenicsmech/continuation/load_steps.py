@@ -270,6 +270,8 @@ class LoadStepper(Stepper):
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin = self._value
         self._rate: Step | None = None  # of the last step, by the control value
+        # at the start and the values asked for, on the path of the last one
+        self._passed: list[tuple[float, EquilibriumPoint]] = []
         self.iterations = self.snaps = 0
 
     def advance(self, control: Control, *, failures: int | None = None) -> EquilibriumPoint:
@@ -285,6 +287,7 @@ class LoadStepper(Stepper):
         """
         if not self._points:
             self._settle(control.at(self._value))
+        self._return_towards(control.prescribed)
         distance = control.prescribed - self._value
         most = self._steps.failures if failures is None else min(failures, self._steps.failures)
         way = _Way(control, distance, step=distance, most=most, patient=failures is not None)
@@ -292,7 +295,7 @@ class LoadStepper(Stepper):
             point, snapped = self._next(way)
             if snapped:
                 self.snaps += 1
-                self._rate = None
+                self._rate, self._passed = None, []
                 _log.warning(
                     "between %g and %g the path turns back; the next equilibria are on another one",
                     self._value,
@@ -302,6 +305,7 @@ class LoadStepper(Stepper):
             way.step = point.control.prescribed - self._value
             self._accept_at(point, snapped=snapped)
             if self._value == control.prescribed:
+                self._passed.append((self._value, point))
                 return point
             way.failed, way.beyond = 0, None
             if changed and not way.halved:
@@ -406,9 +410,19 @@ class LoadStepper(Stepper):
     def _settle(self, control: Control) -> None:
         """The equilibrium at the start, whose tangent limits the first step."""
         try:
-            self._accept_at(self._correct(self._start, control))
+            point = self._correct(self._start, control)
         except NotConverged:
-            pass
+            return
+        self._accept_at(point)
+        self._passed.append((self._value, point))
+
+    def _return_towards(self, value: float) -> None:
+        """Steps begin at the equilibrium nearest to ``value`` of those that the path came through, without a step."""
+        if not self._passed:
+            return
+        nearest, point = min(self._passed, key=lambda passed: abs(passed[0] - value))
+        if abs(nearest - value) < abs(self._value - value):
+            self._points, self._value, self._width, self._rate = [point], nearest, 0.0, None
 
     def _correct(self, guess: State, control: Control, *, brief: bool = False) -> EquilibriumPoint:
         """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind;

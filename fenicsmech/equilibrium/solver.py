@@ -29,7 +29,7 @@ _NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
 _STILL = 1e-12  # likewise, that is the rounding of displacements
 _FAR = 100.0  # residual over rounding beyond which no step is as small as that
 _ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
-_TURNED = 1e-6  # likewise along the next step, where stiff links turn
+_DONE = 1e-6  # work of a residual along the step it asks for, over the forces times the motion, that may be rounding
 STEP = 1e-6  # relative error that iterative solvers may leave in steps and tangents: the next iteration corrects it
 
 
@@ -217,14 +217,14 @@ class EquilibriumSolver(ABC):
     ) -> EquilibriumPoint:
         """The ``best`` state if its residual is rounding, as at a bifurcation; else raises the ``failure``.
 
-        Rounding is up to 1e-4 of the forces where the KKT matrix is nearly singular, also along the step x that the
-        residual r still asks for, of largest motion |x|: soft springs may be out of balance by less than |r| tells,
+        Rounding is up to 1e-4 of the forces where the KKT matrix is nearly singular, more where stiff links turn. It
+        does no work along the step x that the residual r still asks for, of largest motion |x|: near a fold a residual
+        as small may ask for a large one, and soft springs may be out of balance by less than |r| tells,
 
-            r · x ≤ 1e-4 forces |x|,     K x = r.
+            r · x ≤ 1e-6 forces |x|,     K x = r.
 
-        Where stiff links turn, their rounding may be more of the forces, but along x only 1e-6 of them. That of many
-        nodes may exceed its bound: an x as small as the rounding of displacements shows it. Where that of K drowns what
-        resists, x tells nothing.
+        The rounding of many nodes may exceed its bound: an x as small as that of displacements shows it. Where that of
+        K drowns what resists, x tells nothing.
         """
         near_singular, rounding = residual.norm <= self.roundoff(residual), self.rounding(residual)
         if not (near_singular or residual.norm <= _FAR * rounding) or not math.isfinite(residual.norm):
@@ -233,9 +233,8 @@ class EquilibriumSolver(ABC):
         x = at.solve(at.residual.vector)
         motion = self.system.size(self.system.unknowns.step(x))
         work = abs(x.dot(at.residual.vector)) / self.system.unknowns.unit
-        share = _ROUNDING if near_singular else _TURNED
         within = near_singular or residual.norm <= rounding
-        balanced = within and (motion <= _NO_MOTION or work <= share * at.residual.forces * motion)
+        balanced = within and (motion <= _NO_MOTION or work <= _DONE * at.residual.forces * motion)
         if not (balanced or motion <= _STILL) or at.drowns_modes:
             raise failure
         residuals = [*residuals[: failure.iterations], self.relative(at.residual)]
