@@ -19,7 +19,8 @@ the same on all processes and machines, and not by time:
     3. shorter steps where elements are inverted               its ``halvings_inverted`` an iteration
     4. line search, from the best state so far                 its ``iterations`` and ``factorisations``, with 2 and 3
     5. other least shifts of zero-energy modes; not where      ``LoadSteps.shift_factors``, a solve each, or two that
-       links stretch straight and a value has failed           fail alike
+       links stretch straight and a value has failed, nor      fail alike
+       once an equilibrium past a fold is known
     6. steps that turn links (``equilibrium.turning``), 1 to   as these; the kind that led to the last equilibrium
        5, or those that do not; likewise                       comes first
     7. half the step                                           ``LoadSteps.smallest``, ``smallest_snap_step`` once an
@@ -342,9 +343,11 @@ class LoadStepper(Stepper):
         return way.control.prescribed if abs(step) >= abs(remaining) * (1.0 - 1e-9) else self._value + step
 
     def _tried(self, way: _Way, control: Control) -> EquilibriumPoint:
-        """The equilibrium at the value of ``control``, from a prediction."""
+        """The equilibrium at the value of ``control``, from a prediction; by one solve where one beyond is known, or
+        where links stretch straight and a value has failed."""
         guess = self._last.state if way.inverts and self._last else self._guess(control)
-        return self._correct(guess, control, brief=self._failed(control.prescribed, way.tried) and self._straight)
+        brief = way.beyond is not None or (self._failed(control.prescribed, way.tried) and self._straight)
+        return self._correct(guess, control, brief=brief)
 
     def _after(self, way: _Way, control: Control, failure: NotConverged) -> EquilibriumPoint | None:
         """The equilibrium taken where the value of ``control`` has none, once steps are not halved any more; else None.

@@ -217,14 +217,14 @@ class EquilibriumSolver(ABC):
     ) -> EquilibriumPoint:
         """The ``best`` state if its residual is rounding, as at a bifurcation; else raises the ``failure``.
 
-        Rounding is up to 1e-4 of the forces where the KKT matrix is nearly singular, more where stiff links turn. It
-        does no work along the step x that the residual r still asks for, of largest motion |x|: near a fold a residual
-        as small may ask for a large one, and soft springs may be out of balance by less than |r| tells,
+        Rounding is up to 1e-4 of the forces where the KKT matrix is nearly singular, more where stiff links turn. The
+        step x that the residual r still asks for, of largest motion |x|, is none then, or r does no work along it,
 
-            r · x ≤ 1e-6 forces |x|,     K x = r.
+            r · x ≤ 1e-6 forces |x|,     K x = r:
 
-        The rounding of many nodes may exceed its bound: an x as small as that of displacements shows it. Where that of
-        K drowns what resists, x tells nothing.
+        near a fold a residual as small may ask for a large motion, and soft springs may be out of balance by less than
+        |r| tells. The rounding of many nodes may exceed its bound: an x of neither work nor motion shows it, or one as
+        small as the rounding of displacements. Where that of K drowns what resists, x tells nothing.
         """
         near_singular, rounding = residual.norm <= self.roundoff(residual), self.rounding(residual)
         if not (near_singular or residual.norm <= _FAR * rounding) or not math.isfinite(residual.norm):
@@ -234,8 +234,8 @@ class EquilibriumSolver(ABC):
         motion = self.system.size(self.system.unknowns.step(x))
         work = abs(x.dot(at.residual.vector)) / self.system.unknowns.unit
         within = near_singular or residual.norm <= rounding
-        balanced = within and (motion <= _NO_MOTION or work <= _DONE * at.residual.forces * motion)
-        if not (balanced or motion <= _STILL) or at.drowns_modes:
+        small = (within, motion <= _NO_MOTION, work <= _DONE * at.residual.forces * motion)
+        if not (sum(small) >= 2 or motion <= _STILL) or at.drowns_modes:
             raise failure
         residuals = [*residuals[: failure.iterations], self.relative(at.residual)]
         return at.point(residuals, failure.iterations, tolerance=STEP)

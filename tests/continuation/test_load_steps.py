@@ -42,6 +42,16 @@ def test_there_and_back_ends_where_it_began(space):
     assert last.strain_energy == pytest.approx(0.0, abs=1e-15 * there.strain_energy + 1e-18)
 
 
+@pytest.mark.parametrize("asked", ["forces", "displacements"])
+def test_beyond_the_start_no_step_leads_back(asked):
+    """The path is unique until it snaps: on the other side of what is known it goes on from there."""
+    simulation, push = finger("plane-stress")
+    _, other = simulation.load_displacement(push, **{asked: [12.0, -12.0]}).frames
+    _, alone = simulation.load_displacement(push, **{asked: [0.0, -12.0]}).frames
+    assert other.iterations == alone.iterations
+    assert np.array_equal(other.state.u, alone.state.u)
+
+
 def test_nothing_is_left_of_an_earlier_curve():
     simulation, push = finger("plane-stress")
     first = simulation.load_displacement(push, forces=[3.0])
