@@ -33,13 +33,14 @@ from fenicsmech.design.optimisers.problem import Infeasible, Iterate, Optimiser,
 from fenicsmech.design.result import DesignResult, Reached
 from fenicsmech.design.run import Checkpoint, DesignIterate, DesignProgress, Optimum, Round, Saved, minimise_together
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
-from fenicsmech.design.target import Comparison, check_sensitivities
+from fenicsmech.design.target import MET, Comparison, check_sensitivities
 from fenicsmech.design.transfer import WholeState
 from fenicsmech.errors import EquilibriumError, set_options
 from fenicsmech.log import logger
 from fenicsmech.quantities import Sample
 
 _log = logger(__name__)
+_FINER = 1e-2  # tolerance of a minimum that misses a target, over the optimiser's own
 _UNREACHED = "loaded from zero, the optimum does not reach all its targets: %s"
 
 
@@ -367,7 +368,8 @@ class CorrectedRun:
         """The optimum of a round, and the round with values and objective at the start of the optimisation.
 
         A later round that ends with violated inequalities, which the design of the round before met as they were then,
-        is repeated from the run's start.
+        is repeated from the run's start. A minimum that misses a target goes on with a smaller tolerance: beside a
+        large R a gain that is small compared with O may be what meets it.
         """
         _, objective = low.team
         objective.correction, found, self._found = np.array(round.correction), self._found, None
@@ -399,4 +401,14 @@ class CorrectedRun:
             if optimum.reason is Reason.VIOLATED and round.changes:
                 again = Start(self._given(low)[0], optimum.number, optimum.evaluations)
                 optimum = minimise_together(self._comm, objective, self._optimiser, again, watch=watch)
+            if optimum.reason.converged and self._misses(objective):
+                finer = replace(self._optimiser, tolerance=_FINER * self._optimiser.least_reduction)
+                kept = self._optimiser.continued(optimum.memory)
+                again = Start(optimum.parameters, optimum.number, optimum.evaluations, kept)
+                optimum = minimise_together(self._comm, objective, finer, again, watch=watch)
         return optimum, self._comm.bcast(round, root=0)
+
+    def _misses(self, objective: Objective) -> bool:
+        """Whether a target is missed at the best design so far."""
+        errors = self._comm.bcast(objective.comparison.errors(objective.compared) if self._comm.rank == 0 else None)
+        return bool(np.any(np.abs(errors) > MET))

@@ -16,7 +16,7 @@ from fenicsmech.design.numbers import Number, NumberDesign
 from fenicsmech.design.rest_shape import DesignedLink, ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement
 from fenicsmech.design.shape.shape_map import gather_links
-from fenicsmech.design.target import Comparison
+from fenicsmech.design.target import MET, Comparison
 from fenicsmech.errors import DescriptionError, counted, point_text
 from fenicsmech.export import PinHole, write_step, write_stl
 from fenicsmech.files import atomic_write, file_names, read_json, write_json
@@ -85,7 +85,7 @@ class PartValue:
     @property
     def met(self) -> bool:
         """Whether the error is at most one per cent."""
-        return abs(self.error) <= 0.01
+        return abs(self.error) <= MET
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class TargetResult:
     @property
     def met(self) -> bool:
         """Whether the error is at most one per cent."""
-        return abs(self.error) <= 0.01
+        return abs(self.error) <= MET
 
     def __str__(self) -> str:
         unit, reached = f" {self.unit}" if self.unit else "", _text(self.corrected)

@@ -18,6 +18,9 @@ from fenicsmech.multibody import assemble
 from fenicsmech.quantities import Component, Displacement, ForceMagnitude, Magnitude, Quantity, Sample
 from fenicsmech.simulation import CurveRequest, Simulation, read_request
 
+MET = 0.01
+"""Largest error of a target that counts as met, over its scale."""
+
 Numbers = float | Sequence[float] | np.ndarray
 
 

@@ -299,10 +299,12 @@ class Optimiser(ABC):
 
     Attributes:
         iterations: maximum number of iterations.
+        tolerance: least reduction worth a step, over the objective.
         least_reduction: predicted reduction over the objective below which it ends in any case.
     """
 
     iterations: int
+    tolerance: float | None
 
     @property
     @abstractmethod

@@ -92,6 +92,7 @@ EXACT, ROUNDED_TOO = ("equilibrium",), ("equilibrium", ROUNDED)
         pytest.param(30125, EXACT, 1, id="a link folds against a wall, which takes more iterations"),
         pytest.param(18468, EXACT, 2, id="a force balances beside reactions of a prestrained rod 1e5 times as large"),
         pytest.param(39593, ROUNDED_TOO, 2, id="a force of 1e-11 N swings a loose linkage onto a cylinder"),
+        pytest.param(45513, EXACT, 6, id="path of a prestrained link against a spring below rounding goes on"),
         pytest.param(39817, ROUNDED_TOO, 2, id="two dead forces balance in a pose that load steps miss by rounding"),
     ],
 )
