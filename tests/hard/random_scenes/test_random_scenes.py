@@ -59,10 +59,10 @@ def test_scenes_that_make_sense_end_well(seed):
     assert not result.wrong, result
 
 
-@pytest.mark.parametrize("seed", [39, 639, 799, 22079, 26279])
+@pytest.mark.parametrize("seed", [39, 639, 799, 22079, 26279, 42639])
 def test_designs_end_well(seed):
     # a target that is met, links that do not carry the force, a force that moves nothing, a bound that the first
-    # correction tightens, a mechanism that snaps on the way to its load
+    # correction tightens, a mechanism that snaps on the way to its load, a gain that is small beside bounds
     result = judge(seed)
     assert not result.wrong, result
     assert result.scene.startswith("design")
