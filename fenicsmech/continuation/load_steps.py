@@ -273,7 +273,7 @@ class LoadStepper(Stepper):
         self._origin = self._value
         self._rate: Step | None = None  # of the last step, by the control value
         # at the start and the values asked for, on the path of the last one
-        self._passed: list[tuple[float, EquilibriumPoint]] = []
+        self._passed: list[EquilibriumPoint] = []
         self.iterations = self.snaps = 0
 
     def advance(self, control: Control, *, failures: int | None = None) -> EquilibriumPoint:
@@ -307,7 +307,7 @@ class LoadStepper(Stepper):
             way.step = point.control.prescribed - self._value
             self._accept_at(point, snapped=snapped)
             if self._value == control.prescribed:
-                self._passed.append((self._value, point))
+                self._passed.append(point)
                 return point
             way.failed, way.beyond = 0, None
             if changed and not way.halved:
@@ -418,15 +418,16 @@ class LoadStepper(Stepper):
         except NotConverged:
             return
         self._accept_at(point)
-        self._passed.append((self._value, point))
+        self._passed.append(point)
 
     def _return_towards(self, value: float) -> None:
         """Steps begin at the equilibrium nearest to ``value`` of those that the path came through, without a step."""
         if not self._passed:
             return
-        nearest, point = min(self._passed, key=lambda passed: abs(passed[0] - value))
-        if abs(nearest - value) < abs(self._value - value):
-            self._points, self._value, self._width, self._rate = [point], nearest, 0.0, None
+        nearest = min(self._passed, key=lambda point: abs(point.control.prescribed - value))
+        if abs(nearest.control.prescribed - value) < abs(self._value - value):
+            self._points, self._value = [nearest], nearest.control.prescribed
+            self._width, self._rate = 0.0, None
 
     def _correct(self, guess: State, control: Control, *, brief: bool = False) -> EquilibriumPoint:
         """The equilibrium near ``guess``, by steps of the kind that led to the last one, else by the other kind;
