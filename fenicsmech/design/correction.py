@@ -368,8 +368,8 @@ class CorrectedRun:
         """The optimum of a round, and the round with values and objective at the start of the optimisation.
 
         A later round that ends with violated inequalities, which the design of the round before met as they were then,
-        is repeated from the run's start. A minimum that misses a target goes on with a smaller tolerance: beside a
-        large R a gain that is small compared with O may be what meets it.
+        is repeated from the run's start. A minimum that misses a target goes on with a smaller tolerance where what
+        meets it is a gain that the tolerance neglects beside the rest of O.
         """
         _, objective = low.team
         objective.correction, found, self._found = np.array(round.correction), self._found, None
@@ -401,14 +401,20 @@ class CorrectedRun:
             if optimum.reason is Reason.VIOLATED and round.changes:
                 again = Start(self._given(low)[0], optimum.number, optimum.evaluations)
                 optimum = minimise_together(self._comm, objective, self._optimiser, again, watch=watch)
-            if optimum.reason.converged and self._misses(objective):
+            if optimum.reason.converged and self._neglects_targets(objective, optimum):
                 finer = replace(self._optimiser, tolerance=_FINER * self._optimiser.least_reduction)
                 kept = self._optimiser.continued(optimum.memory)
                 again = Start(optimum.parameters, optimum.number, optimum.evaluations, kept)
                 optimum = minimise_together(self._comm, objective, finer, again, watch=watch)
         return optimum, self._comm.bcast(round, root=0)
 
-    def _misses(self, objective: Objective) -> bool:
-        """Whether a target is missed at the best design so far."""
-        errors = self._comm.bcast(objective.comparison.errors(objective.compared) if self._comm.rank == 0 else None)
-        return bool(np.any(np.abs(errors) > MET))
+    def _neglects_targets(self, objective: Objective, optimum: Optimum) -> bool:
+        """Whether a target is missed and ½ ‖r‖² of all is below the optimiser's tolerance times the rest of O."""
+
+        def decide() -> bool:
+            comparison, values = objective.comparison, objective.compared
+            r, rest = comparison.residuals(values), abs(comparison.plain(values)) + optimum.regulariser
+            missed = bool(np.any(np.abs(comparison.errors(values)) > MET))
+            return missed and 0.5 * float(r @ r) <= self._optimiser.least_reduction * rest
+
+        return self._comm.bcast(decide() if self._comm.rank == 0 else None)
