@@ -8,6 +8,13 @@ b the depth of a planar link; in space 1, or 2 where only one half is meshed. In
 energy: they are left out. In links in the u–p formulation Π(H, p) takes the place of W, and E has a saddle there: a
 minimum in u, a maximum in p.
 
+Equilibria balance ∂E/∂u in the form of S, equal to ∂W/∂F in exact arithmetic:
+
+    ∂E/∂u · v = ∫ S : sym(Fᵀ ∇v) dV,     S = sym(F⁻¹ ∂W/∂F).
+
+Rounding of S does no work along motions that strain nothing, while that of ∂W/∂F, μ ε per volume, does: along rigid
+motions of a stiff link it is larger than small forces, springs and weights.
+
 A step of Newton's method that turns a slender link also stretches it, at second order, and stretching is stiffer than
 bending by the square of length over thickness: the stress S(u + δu) of the displacements is then far larger than the
 one that the step solved for, S(u) + ∂S/∂E : δE with δE = sym(Fᵀ ∇δu). Newton's method with S as an unknown of its own
@@ -76,9 +83,17 @@ class ElasticBody(BodyFields):
         return _sum(density * dx for density, dx in self.densities(self.gradient(self.u)))
 
     @cached_property
-    def _residuals_ufl(self) -> list[ufl.Form]:
+    def _gradients_ufl(self) -> list[ufl.Form]:
         """∂E/∂u and, where there is p, ∂E/∂p in directions of test functions."""
         return [ufl.derivative(self.energy_ufl, field) for field in self.fields]
+
+    @cached_property
+    def _balance_ufl(self) -> ufl.Form:
+        """∂E/∂u with the work of links as ∫ S : sym(Fᵀ∇v) dV."""
+        H = ufl.variable(self.gradient(self.u))
+        change = ufl.dot(ufl.transpose(_deformation(H)), self.gradient(ufl.TestFunction(self.u.function_space)))
+        work = _sum(ufl.inner(S, ufl.sym(change)) * dx for S, dx in self.material_stresses(H))
+        return work if self.effects_ufl is None else work + ufl.derivative(self.load_factor * self.effects_ufl, self.u)
 
     def free(self, degree: int) -> ufl.Measure:
         """The measure of all cells that can deform, with quadrature of ``degree``."""
@@ -97,6 +112,15 @@ class ElasticBody(BodyFields):
             found.append((density * self._volume, term.dx))
         return found
 
+    def material_stresses(self, H, p=None) -> list[tuple]:
+        """Second Piola–Kirchhoff stress S = sym(F⁻¹ ∂W/∂F) per volume of the mesh, and where it holds, per law.
+
+        Args:
+            H: a variable, the gradient on the rest shape.
+            p: the pressure, by default the body's.
+        """
+        return [(ufl.sym(ufl.dot(ufl.inv(_deformation(H)), ufl.diff(W, H))), dx) for W, dx in self.densities(H, p)]
+
     def contraction_energy(self, a, v, p, q, pressures: Sequence[float], *, degree: int) -> ufl.Form:
         """Energy of links in plane stress that contract by a instead of h = F₃₃ − 1 and curl across their depth by v.
 
@@ -109,7 +133,7 @@ class ElasticBody(BodyFields):
         """
         assert isinstance(self.model, PlaneStress), "links contract freely in plane stress alone"
         H, b, terms = self.gradient(self.u), self.depth, []
-        F = ufl.Identity(self.model.dim) + H
+        F = _deformation(H)
         squeezing = self.load_factor * self.cellwise(pressures) * a * ufl.det(F)
         grown, shear = 1, self.gradient(a) - ufl.dot(F.T, v)
         G = ufl.sym(ufl.dot(F.T, self.gradient(v)))
@@ -182,12 +206,12 @@ class ElasticBody(BodyFields):
     @cached_property
     def residual_forms(self) -> list:
         """∂E/∂(u, p), field by field."""
-        return [compile_form(residual) for residual in self._residuals_ufl]
+        return [compile_form(residual) for residual in [self._balance_ufl, *self._gradients_ufl[1:]]]
 
     @cached_property
     def stiffness_forms(self) -> list[list]:
         """∂²E/∂(u, p)², block by block."""
-        return [[compile_form(ufl.derivative(row, field)) for field in self.fields] for row in self._residuals_ufl]
+        return [[compile_form(ufl.derivative(row, field)) for field in self.fields] for row in self._gradients_ufl]
 
     @cached_property
     def _strain_form(self):
@@ -371,7 +395,7 @@ class ElasticBody(BodyFields):
     def _samples(self) -> list[fem.Expression]:
         """The compiled components of σ and F at the points of samples, per law."""
         H, found = self._sampled_gradient, []
-        F = ufl.Identity(self.model.dim) + H
+        F = _deformation(H)
         for stress in self._stresses(H):
             parts = [stress[i, j] for i in range(3) for j in range(3)]
             parts += [F[i, j] for i in range(self.model.dim) for j in range(self.model.dim)]
@@ -392,11 +416,13 @@ class PredictedStress:
             [fem.Function(field.function_space, name=name) for field in body.fields] for name in ("before", "motion")
         )
         v, w = (body.gradient(argument) for argument in (ufl.TestFunction(space), ufl.TrialFunction(space)))
-        F = ufl.Identity(body.model.dim) + body.gradient(body.u)
+        F = _deformation(body.gradient(body.u))
         forces, stiffness = [], []
-        for (before, measure), (present, _) in zip(
-            self._stresses(self._before), self._stresses(body.fields), strict=True
-        ):
+        stresses = [
+            body.material_stresses(ufl.variable(body.gradient(fields[0])), *fields[1:])
+            for fields in (self._before, body.fields)
+        ]
+        for (before, measure), (present, _) in zip(*stresses, strict=True):
             rates = [ufl.derivative(before, *pair) for pair in zip(self._before, self._motion, strict=True)]
             change = sum(rates, start=before) - present
             forces.append(ufl.inner(ufl.dot(F, change), v) * measure)
@@ -428,13 +454,10 @@ class PredictedStress:
         else:
             add_blocks(matrix, [[self._stiffness, None], [None, self._no_compliance]])
 
-    def _stresses(self, fields: list[fem.Function]):
-        """Second Piola–Kirchhoff stress S(u, p) = F⁻¹ ∂W/∂F per volume of the mesh, and where it holds, per law."""
-        H = ufl.variable(self._body.gradient(fields[0]))
-        F = ufl.Identity(self._body.model.dim) + H
-        for work, measure in self._body.densities(H, *fields[1:]):
-            stress = ufl.dot(ufl.inv(F), ufl.diff(work, H))
-            yield 0.5 * (stress + ufl.transpose(stress)), measure
+
+def _deformation(H):
+    """F = I + H, symbolic."""
+    return ufl.Identity(H.ufl_shape[0]) + H
 
 
 def _sum(terms):
