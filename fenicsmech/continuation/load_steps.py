@@ -370,7 +370,13 @@ class LoadStepper(Stepper):
         if way.beyond is not None:
             return way.beyond
         longer, way.patient = not way.patient, True
-        return self._beyond_steps(control, failure, way.tried, hidden, longer=longer)
+        try:
+            return self._beyond_steps(control, failure, way.tried, hidden, longer=longer)
+        except LoadStepsFailed:
+            if not way.aside:
+                raise
+            way.beyond = way.aside.pop(min(way.aside, key=lambda value: abs(value - self._value)))
+            return way.beyond
 
     @property
     def _last(self) -> EquilibriumPoint | None:

@@ -34,7 +34,6 @@ _ITERATIONS = 10  # to vanishing works
 _TRIALS = 40  # of the length of one step
 _ROUNDED = 1e-14  # motion, rad or over the mechanism's length, that moves nothing
 _FELT = 1e-12  # slope over the largest
-_MOVED = 1e-6  # travel over the mechanism's length, per motion, above which a force works
 _ROUNDS = 4  # of moving links and relaxing them
 
 
@@ -78,24 +77,6 @@ class Balance:
                 continue
             return point, iterations + point.iterations
         return None, iterations
-
-    def with_force(self, point: EquilibriumPoint, control: Control) -> EquilibriumPoint:
-        """The equilibrium at ``point``, of a prescribed displacement, with the force f that balances what acts along
-        motions that deform no link.
-
-            f = a · w / |a|²,     a_i the travel along m_i,     w_i the work of all else,
-
-        in place of one that rounding of stiff links has changed; what converged keeps its own.
-        """
-        if point.residuals[-1] <= self._solver.options.tolerance:
-            return point
-        motions = self._motions(point.state)
-        w, less = (self._works(replace(point.state, force=force), control, motions) for force in (0.0, 1.0))
-        travels = w - less
-        if not np.abs(travels).max(initial=0.0) > _MOVED * self._model.linkage.length:
-            return point
-        force = agreed(self._comm, float(travels @ w / (travels @ travels)))
-        return replace(point, state=replace(point.state, force=force))
 
     def _rested(self, point: EquilibriumPoint, control: Control) -> tuple[EquilibriumPoint, float, int]:
         """The equilibrium to which motions that deform no link lead from ``point``; its imbalance; iterations spent.

@@ -166,16 +166,13 @@ class CurveStepper:
                     raise self._unreached(control, failure) from failure
                 point = found
             imbalance = 0.0
-            if self.freedom.mobility:
+            if self.freedom.mobility and not control.constrained:
                 balance = Balance(self._model, self.solver)
-                if control.constrained:
-                    point = balance.with_force(point, control)
-                else:
-                    point, imbalance, spent = balance.improved(point, control)
+                point, imbalance, spent = balance.improved(point, control)
+                self._effort += Effort(spent)
+                if imbalance > _LOST and self.adrift and (found := self._reached(control, point)) is not None:
+                    point, imbalance, spent = balance.improved(found, control)
                     self._effort += Effort(spent)
-                    if imbalance > _LOST and self.adrift and (found := self._reached(control, point)) is not None:
-                        point, imbalance, spent = balance.improved(found, control)
-                        self._effort += Effort(spent)
             record = self.record(point)
             if imbalance > _LOST:
                 names = ", ".join(map(repr, self.freedom.mobile))
