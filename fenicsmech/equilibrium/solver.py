@@ -27,7 +27,6 @@ from fenicsmech.errors import counted, expect, set_options
 _STRETCHED = 5e-3  # motion over the mechanism's length, about an element's size, that rounds u as F = I + ∇u is
 _NO_MOTION = 1e-9  # over the mechanism's length, or rad, that counts as none
 _STILL = 1e-12  # likewise, that is the rounding of displacements
-_FEW = 0.2  # residual over the bound of rounding that few exceed
 _FAR = 100.0  # residual over rounding beyond which no step is as small as that
 _ROUNDING = 1e-4  # residual over the forces that may be rounding where the KKT matrix is nearly singular
 _DONE = 1e-6  # work of a residual along the step it asks for, over the forces times the motion, that may be rounding
@@ -200,14 +199,11 @@ class EquilibriumSolver(ABC):
         respond to residuals below the rounding of stiff links. Nor may it rise to more than twice that: then links that
         turn are strained by the last step, which the next one undoes. ``before`` is the norm of the residual one
         iteration ago, 0 if this iteration is the last one; ``noise`` is that of other rounding errors of the residual.
-        Near the bound of rounding, which most stay far below, it must have fallen by less than a tenth.
         """
         if residual.norm <= self.options.tolerance * residual.forces < math.inf and residual.gap <= 1e-10:
             return True
-        most = max(self.rounding(residual), noise)
-        least = 0.25 if residual.norm <= _FEW * most else 0.9
-        steady = least * before < residual.norm and (not before or residual.norm <= 2.0 * before)
-        return steady and residual.norm <= most < math.inf
+        steady = 0.25 * before < residual.norm and (not before or residual.norm <= 2.0 * before)
+        return steady and residual.norm <= max(self.rounding(residual), noise) < math.inf
 
     def accept(
         self, state: State, control: Control, residual: Residual, residuals: Sequence[float], iterations: int
