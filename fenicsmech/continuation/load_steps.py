@@ -272,7 +272,7 @@ class LoadStepper(Stepper):
         self._value = agreed(solver.system.comm, control.value(solver.system, start))
         self._origin = self._value
         self._rate: Step | None = None  # of the last step, by the control value
-        # at the start and the values asked for, on the path of the last one
+        # on the path of the last one: at the start, and at the least and the greatest of the values asked for since
         self._passed: list[EquilibriumPoint] = []
         self.iterations = self.snaps = 0
 
@@ -307,7 +307,7 @@ class LoadStepper(Stepper):
             way.step = point.control.prescribed - self._value
             self._accept_at(point, snapped=snapped)
             if self._value == control.prescribed:
-                self._passed.append(point)
+                self._pass(point)
                 return point
             way.failed, way.beyond = 0, None
             if changed and not way.halved:
@@ -424,7 +424,13 @@ class LoadStepper(Stepper):
         except NotConverged:
             return
         self._accept_at(point)
-        self._passed.append(point)
+        self._pass(point)
+
+    def _pass(self, point: EquilibriumPoint) -> None:
+        """Keeps the equilibrium at a value asked for, if steps may begin there."""
+        start, *others = [*self._passed, point]
+        others.sort(key=lambda other: other.control.prescribed)
+        self._passed = [start, *others[:1], *others[1:][-1:]]
 
     def _return_towards(self, value: float) -> None:
         """Steps begin at the equilibrium nearest to ``value`` of those that the path came through, without a step."""
