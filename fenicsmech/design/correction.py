@@ -373,12 +373,17 @@ class CorrectedRun:
         """
         _, objective = low.team
         objective.correction, found, self._found = np.array(round.correction), self._found, None
-        if found is not None and found.ended is not None and found.ended[1] == repr(self._optimiser):
+        optimiser = self._optimiser
+        finer = replace(optimiser, tolerance=_FINER * optimiser.least_reduction)
+        optimum = None
+        if found is not None and found.ended is not None and found.ended[1] in (repr(optimiser), repr(finer)):
             here = objective.evaluate(begin.parameters)
             reason = Reason[found.ended[0]]
             memory = np.zeros(0) if begin.memory is None else begin.memory
             own = (begin.number, begin.evaluations, here.parameters, memory, reason, begin.refusal)
-            return Optimum(*own, here.penalty.value), round
+            optimum = Optimum(*own, here.penalty.value)
+            if found.ended[1] == repr(finer):
+                return optimum, round
         space, number = low.simulation.fidelity.model.name, len(round.changes) + 1
 
         def watch(iterate: Iterate) -> None:
@@ -390,22 +395,22 @@ class CorrectedRun:
                 drawn = round.drawn or started
                 round = replace(round, started=started, drawn=drawn, initial=iterate.evaluation.value)
             if self._saved is not None:
-                self._saved.save(iterate, objective.placement.theta, round, self._optimiser)
+                self._saved.save(iterate, objective.placement.theta, round, optimiser)
             progress.update(iterate, errors)
             if self._watch is not None:
                 self._watch(DesignIterate(iterate.number, objective.placement, objective.compared, errors))
 
         name = f"design, {space}" if number == 1 else f"design, {space}, round {number}"
         with DesignProgress(self._optimiser, leads=self._comm.rank == 0, name=name) as progress:
-            optimum = minimise_together(self._comm, objective, self._optimiser, begin, watch=watch)
+            if optimum is None:
+                optimum = minimise_together(self._comm, objective, optimiser, begin, watch=watch)
             if optimum.reason is Reason.VIOLATED and round.changes:
                 again = Start(self._given(low)[0], optimum.number, optimum.evaluations)
-                optimum = minimise_together(self._comm, objective, self._optimiser, again, watch=watch)
+                optimum = minimise_together(self._comm, objective, optimiser, again, watch=watch)
             if optimum.reason.converged and self._neglects_targets(objective, optimum):
-                finer = replace(self._optimiser, tolerance=_FINER * self._optimiser.least_reduction)
-                kept = self._optimiser.continued(optimum.memory)
+                kept, optimiser = optimiser.continued(optimum.memory), finer
                 again = Start(optimum.parameters, optimum.number, optimum.evaluations, kept)
-                optimum = minimise_together(self._comm, objective, finer, again, watch=watch)
+                optimum = minimise_together(self._comm, objective, optimiser, again, watch=watch)
         return optimum, self._comm.bcast(round, root=0)
 
     def _neglects_targets(self, objective: Objective, optimum: Optimum) -> bool:

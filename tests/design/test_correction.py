@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 import fenicsmech as fm
-from fenicsmech.design import Infeasible, SampleEquilibria
+from fenicsmech.design import Infeasible, SampleEquilibria, correction
 
 from .mechanisms import Case, truss
 
@@ -192,6 +192,30 @@ def test_a_run_killed_between_two_rounds_ends_as_if_nothing_had_happened(by_defa
     assert (again.iterations, again.reason, again.evaluations) == (whole.iterations, whole.reason, whole.evaluations)
     assert again.corrections == pytest.approx(whole.corrections, rel=1e-5, abs=1e-8)
     assert again.links[0].parameters == pytest.approx(whole.links[0].parameters, rel=1e-7, abs=1e-7)
+    assert again.objective == pytest.approx(whole.objective, rel=1e-6)
+
+
+def test_a_run_killed_after_a_minimum_that_misses_its_targets_goes_on_to_the_finer_one(tmp_path, monkeypatch):
+    file, calls, most = tmp_path / "checkpoint.json", [], [np.inf]
+    minimise = correction.minimise_together
+
+    def counted(comm, objective, optimiser, start, *, watch):
+        if len(calls) == most[0]:
+            raise KeyboardInterrupt
+        calls.append(optimiser.least_reduction)
+        return minimise(comm, objective, optimiser, start, watch=watch)
+
+    # as if what meets the targets were little beside bounds
+    monkeypatch.setattr(correction.CorrectedRun, "_neglects_targets", lambda run, objective, optimum: True)
+    monkeypatch.setattr(correction, "minimise_together", counted)
+    whole = truss(*WANTED).problem().optimise()
+    expected, calls[:], most[:] = calls[:], [], [1]
+    with pytest.raises(KeyboardInterrupt):
+        truss(*WANTED).problem().optimise(checkpoint=file)
+    most[:] = [np.inf]
+    again = truss(*WANTED).problem().optimise(checkpoint=file, resume=True)
+    assert expected[1] == pytest.approx(1e-2 * expected[0]) and calls == expected
+    assert again.iterations == whole.iterations
     assert again.objective == pytest.approx(whole.objective, rel=1e-6)
 
 
