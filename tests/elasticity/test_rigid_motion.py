@@ -50,6 +50,22 @@ def test_rigid_motion_costs_no_energy_and_takes_no_force(body_of, model, law, or
 
 @pytest.mark.thorough
 @each_case
+@pytest.mark.parametrize("order", [1, 2])
+def test_rounding_of_forces_does_no_work_along_rigid_motions(body_of, model, law, order):
+    body = body_of(model, law, order)
+    young, dim = body.parameters["E"].x.array[0], model.dim
+    for angle in ANGLES:
+        body.u.x.array[:] = 0.0
+        move(body, rotation(dim, angle))
+        force = forces(body).reshape(-1, dim)
+        x = rest_shape(body) + body.u.x.array.reshape(-1, dim)
+        turns = np.einsum("ai,aj->ij", force, x)
+        works = [*force.sum(axis=0), *(turns - turns.T).ravel()]
+        assert np.abs(works).max() < 1e-26 * young  # ∂W/∂F : ∇v leaves 1e-15
+
+
+@pytest.mark.thorough
+@each_case
 def test_energy_and_forces_turn_with_the_deformed_body(body_of, model, law):
     body = body_of(model, law)
     interpolate(body.u, wave(model.dim, 0.2, seed=2))
