@@ -28,7 +28,8 @@ the same on all processes and machines, and not by time:
                                                                equilibrium past a fold is known, or ``failures`` in
                                                                a row
     8. the nearest equilibrium found past a fold, a snap; or   one; or one solve ``snap_iterations`` times as long
-       where no fold is seen, that of a longer solve
+       where no fold is seen, that of a longer solve; or the
+       nearest of those kept under contact
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre (``dead_centre``)                  not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -375,8 +376,8 @@ class LoadStepper(Stepper):
         except LoadStepsFailed:
             if not way.aside:
                 raise
-            way.beyond = way.aside.pop(min(way.aside, key=lambda value: abs(value - self._value)))
-            return way.beyond
+        way.beyond = way.aside.pop(min(way.aside, key=lambda value: abs(value - self._value)))
+        return way.beyond
 
     @property
     def _last(self) -> EquilibriumPoint | None:
