@@ -83,17 +83,14 @@ class ElasticBody(BodyFields):
         return _sum(density * dx for density, dx in self.densities(self.gradient(self.u)))
 
     @cached_property
-    def _gradients_ufl(self) -> list[ufl.Form]:
-        """∂E/∂u and, where there is p, ∂E/∂p in directions of test functions."""
-        return [ufl.derivative(self.energy_ufl, field) for field in self.fields]
-
-    @cached_property
-    def _balance_ufl(self) -> ufl.Form:
-        """∂E/∂u with the work of links as ∫ S : sym(Fᵀ∇v) dV."""
+    def _residuals_ufl(self) -> list[ufl.Form]:
+        """∂E/∂u, with the work of links as ∫ S : sym(Fᵀ∇v) dV, and where there is p, ∂E/∂p, of test functions."""
         H = ufl.variable(self.gradient(self.u))
         change = ufl.dot(ufl.transpose(_deformation(H)), self.gradient(ufl.TestFunction(self.u.function_space)))
-        work = _sum(ufl.inner(S, ufl.sym(change)) * dx for S, dx in self.material_stresses(H))
-        return work if self.effects_ufl is None else work + ufl.derivative(self.load_factor * self.effects_ufl, self.u)
+        balance = _sum(ufl.inner(S, ufl.sym(change)) * dx for S, dx in self.material_stresses(H))
+        if self.effects_ufl is not None:
+            balance += ufl.derivative(self.load_factor * self.effects_ufl, self.u)
+        return [balance, *(ufl.derivative(self.energy_ufl, field) for field in self.fields[1:])]
 
     def free(self, degree: int) -> ufl.Measure:
         """The measure of all cells that can deform, with quadrature of ``degree``."""
@@ -206,12 +203,13 @@ class ElasticBody(BodyFields):
     @cached_property
     def residual_forms(self) -> list:
         """∂E/∂(u, p), field by field."""
-        return [compile_form(residual) for residual in [self._balance_ufl, *self._gradients_ufl[1:]]]
+        return [compile_form(residual) for residual in self._residuals_ufl]
 
     @cached_property
     def stiffness_forms(self) -> list[list]:
         """∂²E/∂(u, p)², block by block."""
-        return [[compile_form(ufl.derivative(row, field)) for field in self.fields] for row in self._gradients_ufl]
+        gradients = [ufl.derivative(self.energy_ufl, field) for field in self.fields]
+        return [[compile_form(ufl.derivative(row, field)) for field in self.fields] for row in gradients]
 
     @cached_property
     def _strain_form(self):
