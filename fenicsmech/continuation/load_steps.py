@@ -308,7 +308,7 @@ class LoadStepper(Stepper):
             way.step = point.control.prescribed - self._value
             self._accept_at(point, snapped=snapped)
             if self._value == control.prescribed:
-                self._pass(point)
+                self._remember(point)
                 return point
             way.failed, way.beyond = 0, None
             if changed and not way.halved:
@@ -425,10 +425,10 @@ class LoadStepper(Stepper):
         except NotConverged:
             return
         self._accept_at(point)
-        self._pass(point)
+        self._remember(point)
 
-    def _pass(self, point: EquilibriumPoint) -> None:
-        """Keeps the equilibrium at a value asked for, if steps may begin there."""
+    def _remember(self, point: EquilibriumPoint) -> None:
+        """Keeps the equilibrium at a value asked for, at which steps may begin, if it is the first or the outermost."""
         start, *others = [*self._passed, point]
         others.sort(key=lambda other: other.control.prescribed)
         self._passed = [start, *others[:1], *others[1:][-1:]]
