@@ -36,7 +36,6 @@ from operator import add
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from fenicsmech.collective import agreed
 from fenicsmech.design.optimisers.problem import Infeasible
@@ -462,7 +461,7 @@ class SampleEquilibria:
         self._model.load(start)
         missing = system.residual(start, control).vector
         system.unknowns.turn(found.state.poses)
-        missed = self._missed(path, found, start, found.state, missing)
+        missed = found.linearisation.missed(start, found.state, missing, self._options.rounding)
         distance, motion = (system.size(system.difference(start, other)) for other in (found.state, unloaded))
         farthest = max(self._options.farthest_transfer * motion, self._options.rounding)
         if missed > self._options.largest_transfer_miss or distance > farthest:
@@ -501,7 +500,7 @@ class SampleEquilibria:
         model.load(back)
         missing = system.residual(back, before.control).vector
         missing.scale(-1.0)
-        missed = self._missed(path, found, start, back, missing)
+        missed = found.linearisation.missed(start, back, missing, self._options.rounding)
         model.reshape(after.design)
         if missed > self._options.largest_miss:
             raise _Lost(_lost(path.sample, "a fold lies between this design and the last one"))
@@ -521,13 +520,6 @@ class SampleEquilibria:
         except EquilibriumError as error:
             raise Infeasible(str(error)) from error
         return found
-
-    def _missed(self, path: _Path, found: EquilibriumPoint, start: State, back: State, missing: PETSc.Vec) -> float:
-        """|y₀ − ŷ₀| / |δ|, 0 within rounding: δ = K₁⁻¹ ``missing``, ŷ₀ = y + δ, y₀ is ``start`` and y ``back``."""
-        system = path.solver.system
-        step = system.unknowns.step(found.linearisation.solve(missing))
-        miss = system.size(system.difference(start, system.moved(back, step)))
-        return 0.0 if miss <= self._options.rounding else miss / max(system.size(step), 1e-300)
 
 
 @dataclass(frozen=True, eq=False)

@@ -300,6 +300,22 @@ class Linearisation:
                 raise NotConverged("the linear solver stalled")
         return x
 
+    def missed(self, start: State, back: State, missing: PETSc.Vec, rounding: float) -> float:
+        """|y₀ − ŷ₀| / |δ|, 0 within rounding: how far one step back from here misses the guess, much across a fold.
+
+            δ = K⁻¹ r,     ŷ₀ = y + δ.
+
+        Args:
+            start: the guess y₀.
+            back: this equilibrium y, in the coordinates of y₀.
+            missing: r, the residual at y₀.
+            rounding: misses up to this part of the mechanism's length, or rad, count as none.
+        """
+        system = self._system
+        step = system.unknowns.step(self.solve(missing))
+        miss = system.size(system.difference(start, system.moved(back, step)))
+        return 0.0 if miss <= rounding else miss / max(system.size(step), 1e-300)
+
     def _counted(self, right: PETSc.Vec, tolerance: float, iterations: int = 0) -> tuple[PETSc.Vec, Inertia]:
         """x with K x = ``right``, and the inertia of K; raises as ``solve``."""
         self._check()

@@ -133,8 +133,8 @@ class Calibration:
         mixed: the same of elements with a pressure (tests/estimates/test_mixed_error.py).
     """
 
-    displacement: Mapping[int, float] = field(default_factory=lambda: {1: 1.3, 2: 1.6, 3: 2.6})
-    mixed: Mapping[int, float] = field(default_factory=lambda: {2: 0.75, 3: 1.2})
+    displacement: Mapping[int, float] = field(default_factory=lambda: {1: 1.3, 2: 1.6, 3: 2.6, 4: 3.5})
+    mixed: Mapping[int, float] = field(default_factory=lambda: {2: 0.75, 3: 1.2, 4: 1.7})
 
 
 @dataclass(frozen=True, eq=False)

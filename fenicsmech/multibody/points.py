@@ -21,7 +21,8 @@ with the shape functions N_i of the cell that holds P, or their averages over a 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, count
+from math import comb
 
 import basix
 import numpy as np
@@ -259,7 +260,7 @@ def link_point(
 def shape_functions(barycentric: np.ndarray, nodes: int) -> np.ndarray:
     """N_i of the Lagrange element with ``nodes`` at barycentric coordinates (n, dim + 1), (n, nodes)."""
     corners = barycentric.shape[1]
-    order = {corners: 1, corners * (corners + 1) // 2: 2}.get(nodes, 3)
+    order = next(k for k in count(1) if comb(k + corners - 1, k) == nodes)
     shape = basix.CellType.triangle if corners == 3 else basix.CellType.tetrahedron
     element = basix.create_element(basix.ElementFamily.P, shape, order, basix.LagrangeVariant.gll_warped)
     return element.tabulate(0, np.ascontiguousarray(barycentric[:, 1:]))[0, :, :, 0]

@@ -8,12 +8,14 @@
 - ``rest_start``: where curves start
 - ``following``: curves along a path until an end, with its events
 - ``safe_range``: the range of a force that links bear
-- ``frame``, ``curve``: results and their evaluation
+- ``frame``, ``frame_series``, ``curve``: results and their evaluation
+- ``curve_errors``: errors of a curve's values; ``finer_elements``: equilibria of a curve in those of the next order
 - ``fields``: gathering, pictures and files of states
 - ``omitted_effects``: assumptions as text, hints where they matter, and friction in hinges
 """
 
 from fenicsmech.simulation.curve import Axis, Curve
+from fenicsmech.simulation.curve_errors import CheckedErrors
 from fenicsmech.simulation.fields import (
     MechanismPlotter,
     gather,

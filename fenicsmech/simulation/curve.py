@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -11,37 +11,18 @@ import numpy as np
 
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Mode, critical_changes, softest_modes
-from fenicsmech.elasticity import PLANE_STRESS, SPATIAL, ElasticModel
-from fenicsmech.equilibrium import EquilibriumSolver, LoadControl, MotorControl, NotConverged, PointLoad, State, Unknown
+from fenicsmech.elasticity import PLANE_STRESS
+from fenicsmech.equilibrium import LoadControl, MotorControl, NotConverged, Unknown
 from fenicsmech.errors import DescriptionError, EquilibriumError, counted, real_array
-from fenicsmech.estimates import (
-    AccuracyOptions,
-    DoubtOptions,
-    Equilibrium,
-    ErrorKind,
-    Origin,
-    cause_of_growth,
-    examined,
-    growth_by_halving,
-)
+from fenicsmech.estimates import AccuracyOptions, DoubtOptions, ErrorKind
 from fenicsmech.files import write_csv
 from fenicsmech.log import logger
-from fenicsmech.mechanism import (
-    DRAWN,
-    Configuration,
-    FlexibleLink,
-    Force,
-    ForceGroup,
-    Joint,
-    Output,
-    PrescribedPart,
-    Units,
-)
-from fenicsmech.multibody import Freedom
+from fenicsmech.mechanism import DRAWN, FlexibleLink, Force, ForceGroup, Joint, Output, PrescribedPart, Units
 from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
-from fenicsmech.simulation.discretisation import Discretisation
+from fenicsmech.simulation.curve_errors import CheckedErrors, CurveErrors
 from fenicsmech.simulation.fields import MechanismPlotter, gather, peak_mark, position, write_xdmf
 from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode, mode_shape
+from fenicsmech.simulation.frame_series import FrameSeries
 from fenicsmech.simulation.omitted_effects import Explanation, ExplanationOptions, PinFriction, explain, friction_band
 from fenicsmech.stress import EdgeStress, LinkSurface, StressField, allowables, von_mises
 
@@ -75,29 +56,8 @@ def axes(part: PrescribedPart, units: Units) -> tuple[Axis, Axis]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Curve:
-    """Frames of one configuration; methods compute at the rest shape that these belong to.
-
-    Attributes:
-        part: the force that changes, or the motor or drive that moves.
-        configuration: motor positions.
-        freedom: mobility and redundancy of the assembled configuration.
-        frames: one per prescribed value, in their order.
-        discretisation: of the scene, with which they were computed.
-        unloaded: the equilibrium without forces, effects at load factor 0, from which displacements count.
-        others: constant magnitudes of other forces.
-        unknown: of the curve: displacements, or forces where displacements were prescribed or the curve was followed.
-    """
-
-    part: PrescribedPart
-    configuration: Configuration
-    freedom: Freedom
-    frames: tuple[Frame, ...]
-    discretisation: Discretisation
-    unloaded: State
-    others: tuple[tuple[Force, float], ...] = ()
-    unknown: Unknown = Unknown.DISPLACEMENT
-    _errors: dict[tuple[ErrorKind, Output | None], np.ndarray] = field(default_factory=dict, init=False)
+class Curve(FrameSeries):
+    """Frames of one configuration; methods compute at the rest shape that these belong to."""
 
     def __repr__(self) -> str:
         (across, up), first, last = self.axes, self.frames[0], self.frames[-1]
@@ -108,42 +68,10 @@ class Curve:
             f"{up.quantity} {up(first.force)} to {up(last.force)}{f', {unstable} unstable' if unstable else ''}>"
         )
 
-    # -- values of the frames ------------------------------------------------------------------------------------
-
-    @property
-    def units(self) -> Units:
-        """Units of the scene."""
-        return self.discretisation.scene.units
-
     @property
     def axes(self) -> tuple[Axis, Axis]:
         """Quantities and units across and up."""
         return axes(self.part, self.units)
-
-    @property
-    def forces(self) -> np.ndarray:
-        """Forces or torques of the frames, (frames,)."""
-        return np.array([frame.force for frame in self.frames])
-
-    @property
-    def displacements(self) -> np.ndarray:
-        """Displacements or positions of the frames, (frames,)."""
-        return np.array([frame.displacement for frame in self.frames])
-
-    @property
-    def values(self) -> np.ndarray:
-        """``displacements`` or ``forces``, whichever is ``unknown``, (frames,)."""
-        return self.forces if self.unknown is Unknown.FORCE else self.displacements
-
-    @property
-    def stable(self) -> np.ndarray:
-        """Stability of the frames under dead loads, (frames,)."""
-        return np.array([frame.stable for frame in self.frames])
-
-    @property
-    def snapped_through(self) -> np.ndarray:
-        """Whether the mechanism snapped on the way to each frame, (frames,)."""
-        return np.array([frame.snapped_through for frame in self.frames])
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -163,6 +91,11 @@ class Curve:
 
     # -- errors --------------------------------------------------------------------------------------------------
 
+    @cached_property
+    def _errors(self) -> CurveErrors:
+        self._need_force()
+        return CurveErrors(self)
+
     def error_estimates(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated discretisation errors of ``values``, (frames,), to be added to them; computed once.
 
@@ -176,7 +109,7 @@ class Curve:
             DescriptionError: motors move along the curve.
             EquilibriumError: the KKT matrix of a frame is singular.
         """
-        return self._estimated([ErrorKind.ELEMENTS], output)[0].copy()
+        return self._errors.estimated([ErrorKind.ELEMENTS], output)[0]
 
     def modelling_errors(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated errors of plane stress, (frames,), to be added; arguments as those of ``error_estimates``.
@@ -189,14 +122,14 @@ class Curve:
             DescriptionError: motors move along the curve, or it is not in plane stress.
             EquilibriumError: the KKT matrix of a frame is singular.
         """
-        return self._estimated([ErrorKind.PLANE_STRESS], output)[0].copy()
+        return self._errors.estimated([ErrorKind.PLANE_STRESS], output)[0]
 
     def errors_by_kind(self) -> tuple[np.ndarray, np.ndarray]:
         """``error_estimates`` and ``modelling_errors``, from one adjoint per frame; the latter 0 in other models."""
         if self.discretisation.fidelity.model is not PLANE_STRESS:
             return self.error_estimates(), np.zeros(len(self.frames))
-        elements, plane_stress = self._estimated(list(ErrorKind), None)
-        return elements.copy(), plane_stress.copy()
+        elements, plane_stress = self._errors.estimated(list(ErrorKind))
+        return elements, plane_stress
 
     def doubts(self, options: DoubtOptions | None = None, *, modelling: bool = False) -> tuple[tuple[str, ...], ...]:
         """Why ``error_estimates``, or ``modelling_errors``, may be off by more than a factor of two, for every frame.
@@ -209,28 +142,29 @@ class Curve:
 
         Raises as ``error_estimates``, or ``modelling_errors``.
         """
-        self._need_force()
-        options = options or DoubtOptions()
-        kind = ErrorKind.PLANE_STRESS if modelling else ErrorKind.ELEMENTS
-        estimates, solver, origin = self.discretisation.estimates, self._solver, Origin()
-        if (unloaded := self._moved_origin) is not None:
-            origin = Origin.at(estimates, solver, unloaded, kind)
-        prescribed = self.displacements if self.unknown is Unknown.FORCE else self.forces
-        given, found = np.abs(prescribed).max(), np.abs(self.values).max()
-        scale = found / given if given else np.inf
-        own = [examined(estimates, solver, self.equilibrium(at), kind, origin, scale, options) for at in self.frames]
-        errors = np.array([error for error, _ in own])
-        if (kind, None) not in self._errors:
-            self._keep(kind, None, errors)
-        growth = np.abs(self._growth(SPATIAL) if modelling else self.growth_by_halving)
-        of_curve = {
-            "estimate above a tenth of the largest value": AccuracyOptions().corrections(errors, self.values) != errors,
-            "force at a point of a flexible link": growth > options.growth * np.abs(errors),
-        }
-        return tuple(
-            tuple(reason for reason, holds in of_curve.items() if holds[k]) + reasons
-            for k, (_, reasons) in enumerate(own)
-        )
+        return tuple(self._errors.doubts(_kind(modelling), options or DoubtOptions()))
+
+    def checked_errors(
+        self, options: DoubtOptions | None = None, *, modelling: bool = False, frame: Frame | None = None
+    ) -> CheckedErrors:
+        """Errors as ``error_estimates`` or ``modelling_errors``, each from an equilibrium in finer elements.
+
+        The equilibrium of a frame is sought again in elements of the next order on the same mesh, from its own as the
+        guess: how the value changes there, and the estimate there, make up the error; of plane stress the estimate
+        there does. Much of what is said against estimates (``doubts``) holds no more then. What such elements need is
+        compiled and kept for further calls.
+
+        Args:
+            options: when errors are in doubt.
+            modelling: those of plane stress.
+            frame: the one of the curve's whose errors are wanted; all by default.
+
+        Raises as ``error_estimates``, or ``modelling_errors``.
+        """
+        kind, options, errors = _kind(modelling), options or DoubtOptions(), self._errors
+        if frame is None:
+            return errors.checked(kind, options)
+        return CurveErrors(replace(self, frames=(self._chosen(frame),))).checked(kind, options, errors)
 
     @cached_property
     def corrections(self) -> np.ndarray:
@@ -264,7 +198,7 @@ class Curve:
 
         They grow without limit if the force is at a point of a flexible link; 0 if it does not, and where motors move.
         """
-        return self._growth(self.discretisation.fidelity.model)
+        return CurveErrors(self).growth()
 
     # -- stability, friction, assumptions ------------------------------------------------------------------------
 
@@ -330,7 +264,7 @@ class Curve:
         options, frame = ExplanationOptions(tolerance, weight), self.frames[-1]
         self._need_force()
         at = self.equilibrium(frame)
-        return explain(self.discretisation, self.part, self._solver, at, frame, self.units, options)
+        return explain(self.discretisation, self.part, self.solver, at, frame, self.units, options)
 
     # -- pictures and files --------------------------------------------------------------------------------------
 
@@ -486,23 +420,6 @@ class Curve:
 
     # -- helpers --------------------------------------------------------------------------------------------------
 
-    def equilibrium(self, frame: Frame) -> Equilibrium:
-        """The equilibrium of one of the frames, with the unknown of the curve. Local."""
-        return Equilibrium(frame.state, frame.design, self.unknown)
-
-    @property
-    def _solver(self) -> EquilibriumSolver:
-        return self.discretisation.solver(self.part, [other for other, _ in self.others])
-
-    def _growth(self, kind: ElasticModel) -> np.ndarray:
-        """``growth_by_halving`` in an elastic model."""
-        found = self.discretisation
-        growth = growth_by_halving(self.part, found.model, found.fidelity.sizes, kind) * self.forces
-        if self.unknown is Unknown.DISPLACEMENT:
-            return growth
-        # at a given displacement the force is smaller in proportion as its displacement would be larger
-        return -growth * np.divide(self.forces, self.displacements, out=0.0 * growth, where=self.displacements != 0.0)
-
     def _need_force(self) -> None:
         if not isinstance(self.part, Force | ForceGroup):
             where, remedy = f"curve of {self.part.name!r}", "Call this on a curve under a changing force"
@@ -522,7 +439,7 @@ class Curve:
         model, at = self.discretisation.model, self._chosen(frame)
         with model.shaped(at.design):
             try:
-                found = modes(self._solver, control, at.state, count=count)
+                found = modes(self.solver, control, at.state, count=count)
                 return at, [(mode.value, mode_shape(model, mode.step)) for mode in found]
             except NotConverged as failure:
                 where = f"{self.part.name!r} in configuration {self.configuration.name!r}"
@@ -533,41 +450,6 @@ class Curve:
                     last=at,
                 ) from failure
 
-    def _estimated(self, kinds: Sequence[ErrorKind], output: Output | None) -> list[np.ndarray]:
-        """Estimates of errors of each kind, (frames,) each; those not known yet from one adjoint per frame."""
-        self._need_force()
-        missing = [kind for kind in kinds if (kind, output) not in self._errors]
-        if missing:
-            estimates, model = self.discretisation.estimates, self.discretisation.model
-            point = None if output is None else model.point_load(output)
-            origin, zero = self._unloaded_errors(missing, point)
-            at = map(self.equilibrium, self.frames)
-            rows = [estimates.at(self._solver, own, missing, point, origin=origin) for own in at]
-            for kind, column, less in zip(missing, np.array(rows).T, zero, strict=True):
-                self._keep(kind, output, column - less)
-        return [self._errors[kind, output] for kind in kinds]
 
-    def _keep(self, kind: ErrorKind, output: Output | None, errors: np.ndarray) -> None:
-        """Keeps estimates, (frames,), and warns of values that have no limit."""
-        self._errors[kind, output] = errors
-        growth, largest = np.abs(self.growth_by_halving).max(), np.abs(self.values).max()
-        if kind is ErrorKind.ELEMENTS and output is None and growth > ExplanationOptions().tolerance * largest:
-            _log.warning("%s (each halving adds %.2g of it)", cause_of_growth(self.part), growth / largest)
-
-    @property
-    def _moved_origin(self) -> Equilibrium | None:
-        """The unloaded equilibrium, from which displacements count; None in a rigid assembly."""
-        if not self.unloaded.has_reactions:
-            return None
-        return Equilibrium(self.unloaded, self.frames[0].design, Unknown.DISPLACEMENT)
-
-    def _unloaded_errors(self, kinds: Sequence[ErrorKind], output: PointLoad | None) -> tuple[list[float], list[float]]:
-        """Estimated errors of each kind in the unloaded configuration: of the force's displacement, and of the quantity
-        in question where it counts from there; 0 in a rigid assembly."""
-        estimates, nothing = self.discretisation.estimates, [0.0] * len(kinds)
-        if (at := self._moved_origin) is None:
-            return nothing, nothing
-        origin = estimates.at(self._solver, at, kinds)
-        if output is not None:
-            return origin, estimates.at(self._solver, at, kinds, output)
-        return origin, nothing if self.unknown is Unknown.FORCE else origin
+def _kind(modelling: bool) -> ErrorKind:
+    return ErrorKind.PLANE_STRESS if modelling else ErrorKind.ELEMENTS

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 from mpi4py import MPI
 
 from fenicsmech.collective import on_one
 from fenicsmech.continuation import Predictor
+from fenicsmech.elasticity import Quadrature
 from fenicsmech.equilibrium import EquilibriumMethod, EquilibriumSolver, LoadControl, MotorControl, PointLoad
 from fenicsmech.errors import DescriptionError, expect
 from fenicsmech.estimates import Estimates
@@ -96,6 +98,15 @@ class Discretisation:
             other.mesh = self.mesh.on(comm)
         return other
 
+    @cached_property
+    def finer(self) -> Discretisation:
+        """The same scene on the same mesh, in elements of the next order."""
+        fidelity, order = self.fidelity, self.fidelity.order + 1
+        rule = max(fidelity.quadrature, Quadrature.for_order(order, fidelity.model.dim), key=lambda own: own.degree)
+        other = self.at(replace(fidelity, order=order, quadrature=rule), self.clock, self.comm)
+        other.mesh = self.mesh
+        return other
+
     def with_material(self, drawn: Material, other: Material) -> Discretisation:
         """The same scene on the same mesh, with links of another material instead of ``drawn``."""
         for given in (drawn, other):
@@ -106,7 +117,7 @@ class Discretisation:
         changed.linkage = build_linkage(self.scene.mechanism, self.fidelity.model.mechanism_dim, self.moved)
         changed.materials = tuple(other if material == drawn else material for material in self.materials)
         changed.mesh, changed._solvers = self.mesh, {}
-        for name in ("model", "estimates", "stresses"):
+        for name in ("model", "estimates", "stresses", "finer"):
             changed.__dict__.pop(name, None)
         return changed
 

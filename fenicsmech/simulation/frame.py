@@ -1,17 +1,29 @@
-"""Equilibria of a curve with their measured quantities, and modes of their KKT matrices."""
+"""Equilibria of a curve with their measured quantities, what measures them, and modes of their KKT matrices."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from fenicsmech.equilibrium import Reaction, State, Step
+from fenicsmech.collective import agreed
+from fenicsmech.equilibrium import (
+    EquilibriumPoint,
+    EquilibriumSystem,
+    LoadControl,
+    MotorControl,
+    Reaction,
+    State,
+    Step,
+    joint_reactions,
+    motor_torques,
+)
 from fenicsmech.errors import DescriptionError, expect
 from fenicsmech.mechanism import Motor, Output
 from fenicsmech.model import Design, MechanismModel
+from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.stress import (
     LawStability,
     Life,
@@ -154,6 +166,63 @@ class Frame:
         figures.append("stable" if self.stable else f"{self.unstable_modes} unstable modes")
         figures += ["snapped through"] * self.snapped_through
         return f"<Frame: {', '.join(figures)}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """What measures equilibria under a part, with zeros at one of them.
+
+    Attributes:
+        discretisation: of the scene.
+        system: the equations of the part.
+        followed: the control whose value changes along the curve.
+        origin: zero of its displacements.
+        zeros: those of outputs, 0 by default.
+    """
+
+    discretisation: Discretisation
+    system: EquilibriumSystem
+    followed: LoadControl | MotorControl
+    origin: float = 0.0
+    zeros: Mapping[Output, float] = field(default_factory=dict)
+
+    def zeroed(self, state: State) -> Gauge:
+        """The gauge that counts from ``state``; motors count from where they were drawn."""
+        model, origin = self.discretisation.model, 0.0
+        self.system.load(state)
+        if not self.followed.displaces:
+            origin = agreed(self.discretisation.comm, self.followed.conjugate(self.system, state))
+        zeros = {output: model.travel(output, state) for output in model.mechanism.outputs}
+        return replace(self, origin=origin, zeros=zeros)
+
+    def frame(self, point: EquilibriumPoint) -> Frame:
+        """The measured quantities of an equilibrium, of the last solve on the way there alone."""
+        model, state, followed = self.discretisation.model, point.state, self.followed
+        self.system.load(state)
+        with model.clock.phase("measure"):
+            value, conjugate = followed.value(self.system, state), followed.conjugate(self.system, state)
+            outputs = model.mechanism.outputs
+            measured = [value, conjugate, *(model.travel(output, state) for output in outputs)]
+            value, conjugate, *travels = agreed(self.discretisation.comm, measured)
+            displacement, force = (value, conjugate) if followed.displaces else (conjugate, value)
+            return Frame(
+                force=force,
+                displacement=displacement - self.origin,
+                snapped_through=False,
+                unstable_modes=point.unstable_modes,
+                stable_under_control=point.unstable_under_control == 0,
+                strain_energy=model.elastic.strain_energy(),
+                outputs={out: end - self.zeros.get(out, 0.0) for out, end in zip(outputs, travels, strict=True)},
+                reactions=joint_reactions(model.linkage.joints, state),
+                motors=motor_torques(model.linkage.joints, state),
+                iterations=point.iterations,
+                residuals=point.residuals,
+                seconds=0.0,
+                phases={},
+                state=state,
+                design=model.design,
+                stresses=self.discretisation.stresses,
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from time import perf_counter
 
 import numpy as np
 
-from fenicsmech.collective import agreed, from_one
+from fenicsmech.collective import from_one
 from fenicsmech.continuation import ArcSteps, DeadCentreStepper, LoadStepper, LoadSteps, LoadStepsFailed, follow_to
 from fenicsmech.equilibrium import (
     Control,
@@ -27,8 +27,6 @@ from fenicsmech.equilibrium import (
     NotConverged,
     State,
     Unknown,
-    joint_reactions,
-    motor_torques,
 )
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.log import logger
@@ -36,7 +34,7 @@ from fenicsmech.multibody import Assembly, BodyPoint, assemble_before_strain, co
 from fenicsmech.simulation.balance import Balance
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.frame import Frame
+from fenicsmech.simulation.frame import Frame, Gauge
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestPoses
 
@@ -54,7 +52,7 @@ class CurveStepper:
         freedom: mobility of the configuration.
         unloaded: the equilibrium without forces, effects at load factor 0.
         followed: the control whose value changes along the curve.
-        origin: zero of displacements: that of the force's point in the unloaded configuration.
+        gauge: what measures equilibria, from the unloaded configuration.
         adrift: whether nothing but loads holds the mechanism.
     """
 
@@ -72,7 +70,7 @@ class CurveStepper:
         idle = self._system.idle
         self.freedom = from_one(comm, lambda: count_freedom(rigid, assembly.poses, motors, springs, idle))
         self.followed = discretisation.followed_control(request.part)
-        self.origin, self._origins = 0.0, dict.fromkeys(model.mechanism.outputs, 0.0)
+        self.gauge = Gauge(discretisation, self._system, self.followed)
         self._poses, self._rigid_motors = assembly.poses, motors
         self._effort = Effort()  # on the way to the next frame
         with self._timed():
@@ -80,10 +78,7 @@ class CurveStepper:
         self.adrift = bool(self.freedom.zero_energy) and not state.has_reactions
         self._rest_poses = RestPoses(model, self._system, state, motors, request.others, request.part, request.where)
         self._start: CurveStart | None = None  # of the last load steps
-        self._system.load(state)
-        if not self.followed.displaces:  # motors count from where they were drawn
-            self.origin = agreed(comm, self.followed.conjugate(self._system, state))
-        self._origins = {output: model.travel(output, state) for output in model.mechanism.outputs}
+        self.gauge = self.gauge.zeroed(state)
 
     def start(self, control: Control) -> CurveStart:
         """Where load steps to ``control`` start: the present start, unless loads are found to prefer another pose.
@@ -149,7 +144,7 @@ class CurveStepper:
     def frame(self, control: Control) -> Frame:
         """The equilibrium under ``control``."""
         if control.constrained:
-            control = control.at(control.prescribed + self.origin)
+            control = control.at(control.prescribed + self.gauge.origin)
         start = self.start(control)
         steps = start.steps
         iterations, snaps = steps.iterations, steps.snaps
@@ -173,7 +168,7 @@ class CurveStepper:
                 if imbalance > _LOST and self.adrift and (found := self._reached(control, point)) is not None:
                     point, imbalance, spent = balance.improved(found, control)
                     self._effort += Effort(spent)
-            record = self.record(point)
+            record = self.gauge.frame(point)
             if imbalance > _LOST:
                 names = ", ".join(map(repr, self.freedom.mobile))
                 lost = (
@@ -244,35 +239,6 @@ class CurveStepper:
         except EquilibriumError as error:
             error.last, error.frames = self.frames[-1] if self.frames else None, tuple(self.frames)
             raise
-
-    def record(self, point: EquilibriumPoint) -> Frame:
-        """The measured quantities of an equilibrium; the caller adds iterations and times."""
-        model, state, followed = self._model, point.state, self.followed
-        self._system.load(state)
-        with model.clock.phase("measure"):
-            value, conjugate = followed.value(self._system, state), followed.conjugate(self._system, state)
-            travels = [model.travel(output, state) for output in self._origins]
-            value, conjugate, *travels = agreed(self.discretisation.comm, [value, conjugate, *travels])
-            outputs = {output: end - zero for (output, zero), end in zip(self._origins.items(), travels, strict=True)}
-            displacement, force = (value, conjugate) if followed.displaces else (conjugate, value)
-            return Frame(
-                force=force,
-                displacement=displacement - self.origin,
-                snapped_through=False,
-                unstable_modes=point.unstable_modes,
-                stable_under_control=point.unstable_under_control == 0,
-                strain_energy=model.elastic.strain_energy(),
-                outputs=outputs,
-                reactions=joint_reactions(self._joints, state),
-                motors=motor_torques(self._joints, state),
-                iterations=point.iterations,
-                residuals=point.residuals,
-                seconds=0.0,
-                phases={},
-                state=state,
-                design=model.design,
-                stresses=self.discretisation.stresses,
-            )
 
     def _unloaded(self, assembly: Assembly) -> State:
         """The equilibrium without forces, effects at load factor 0.
@@ -483,19 +449,19 @@ class CurveStepper:
     # -- failures ----------------------------------------------------------------------------------------------
 
     def _unreached(self, control: Control, failure: LoadStepsFailed) -> EquilibriumError:
-        last, where = self._last(failure), self.request.where
+        last, where, zero = self._last(failure), self.request.where, self.gauge.origin
         start = self._start
         assert start is not None, "steps that fail have started"
         if control.constrained and from_one(self.discretisation.comm, lambda: self._is_held(start.state)):
             return EquilibriumError(
                 where,
-                f"no equilibrium at displacement {control.prescribed - self.origin:g}: joints and motors hold its "
+                f"no equilibrium at displacement {control.prescribed - zero:g}: joints and motors hold its "
                 "point, which cannot move along its direction",
                 "Choose another point or direction, or load control",
                 last=last,
                 frames=self.frames,
             )
-        what, origin = ("displacement", self.origin) if control.constrained else ("force", 0.0)
+        what, origin = ("displacement", zero) if control.constrained else ("force", 0.0)
         force = f" with a force of {last.force:g}" if control.constrained and last is not None else ""
         tried, remedy = f"{failure.reason}; {len(failure.tried)} smaller steps were tried", {}
         if failure.fold is not None:
@@ -535,7 +501,7 @@ class CurveStepper:
 
     def _last(self, failure: LoadStepsFailed) -> Frame | None:
         """The last equilibrium reached, on the way to a prescribed value too."""
-        return None if failure.last is None else self.record(failure.last)
+        return None if failure.last is None else self.gauge.frame(failure.last)
 
     def _is_held(self, state: State) -> bool:
         """Whether no motion that the joints leave at ``state`` moves the force's point along its direction."""

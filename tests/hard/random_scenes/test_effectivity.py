@@ -44,8 +44,8 @@ def first(topology: str, control: str) -> Blueprint:
 def test_estimates_of_simple_scenes_are_within_a_factor_of_two(topology, control):
     found = judge_scene(0, first(topology, control))
     assert {own.outcome for own in found.kinds.values()} <= {"within", "below resolution"}
-    own = found.elements
-    assert own.outcome == "within"
+    own, checked = found.elements, found.checked_elements
+    assert own.outcome == checked.outcome == "within"
     assert not own.doubts or abs(own.estimate) < own.resolution  # what hardly strains may be in doubt
 
 
@@ -55,6 +55,7 @@ def test_errors_beyond_first_order_are_doubted():
     found = judge_scene(0, replace(CLAMPED_ARCH, control="forces", samples=(load,)))
     assert "estimate above a tenth of the largest value" in found.elements.doubts
     assert found.elements.outcome != "outside"
+    assert found.checked_elements.outcome == "within"
 
 
 def test_equilibria_in_finer_elements_are_those_of_a_curve_from_zero_load(monkeypatch):
@@ -72,10 +73,10 @@ def test_estimators_that_fail_are_outside(monkeypatch):
     def fails(curve, *arguments, **options):
         raise fm.EquilibriumError("estimate", "it is not defined", "Choose another frame")
 
-    monkeypatch.setattr(fm.Curve, "doubts", fails)
+    monkeypatch.setattr(fm.Curve, "checked_errors", fails)
     found = judge_scene(0, first("two-link arch", "forces"))
     assert not found.left_out
-    assert [own.outcome for own in found.kinds.values()] == ["outside", "outside"]
+    assert [own.outcome for own in found.checked] == ["outside", "outside"]
     assert faults([found]) == ["2 estimates are off without a doubt"]
 
 
@@ -95,7 +96,7 @@ def hang(seed: int) -> Judged:
 def test_scenes_that_crash_are_outside_and_those_that_hang_are_left_out(judge: Callable, limit, left_out):
     (found,) = side_by_side(judge, [3], failed, limit=limit, processes=1)
     assert found.left_out == left_out
-    assert [own.outcome for own in found.kinds.values()] == ([] if left_out else ["outside"])
+    assert [own.outcome for own in found.checked] == ([] if left_out else ["outside"])
 
 
 WITHIN, NEEDLESS = Estimate(1.0, 1.0), Estimate(1.0, 1.0, doubts=("limit point near",))
@@ -105,14 +106,14 @@ SAID, OUTSIDE = Estimate(9.0, 1.0, doubts=("limit point near",)), Estimate(9.0, 
 @pytest.mark.parametrize(
     ("odd", "allowed"),
     [
-        (Judged(0, "", elements=SAID), 5),
-        (Judged(0, "", elements=NEEDLESS), 10),
+        (Judged(0, "", checked_elements=SAID), 5),
+        (Judged(0, "", checked_elements=NEEDLESS), 10),
         (Judged(0, "", left_out="too slow"), 20),
-        (Judged(0, "", elements=OUTSIDE), 0),
+        (Judged(0, "", checked_elements=OUTSIDE), 0),
     ],
     ids=["said", "needless", "left out", "outside"],
 )
 def test_shares_of_doubts_and_of_scenes_left_out_are_bounded(odd, allowed):
-    plain = Judged(0, "", elements=WITHIN)
+    plain = Judged(0, "", checked_elements=WITHIN)
     for count, wrong in ((allowed, False), (allowed + 1, True)):
         assert bool(faults([odd] * count + [plain] * (100 - count))) == wrong

@@ -1,0 +1,125 @@
+"""Errors in doubt come from equilibria in elements of the next order, which are those of a curve from zero load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+import fenicsmech as fm
+
+from ..simulation.refined import arch, cantilever, refine
+from .test_doubts import shallow_arch, strained_by_a_motor
+
+
+def simulated(scene: fm.Scene, order: int, space: str = "plane-stress", size: float = 3.0) -> fm.Simulation:
+    return fm.Simulation(scene, space=space, order=order, size=size, comm=MPI.COMM_SELF)
+
+
+def weighed() -> tuple[fm.Scene, fm.Force, float]:
+    """The cantilever under its own weight, too."""
+    scene, push, load = cantilever()
+    return fm.Scene(scene.mechanism, effects=[fm.Gravity((0.0, -9.81))], units=scene.units), push, load
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("held", ["forces", "displacements"])
+@pytest.mark.parametrize(
+    ("described", "space"),
+    [
+        (cantilever, "plane-stress"),
+        (weighed, "plane-strain"),
+        pytest.param(arch, "3d-symmetric", marks=pytest.mark.thorough),
+    ],
+)
+def test_errors_are_those_of_a_curve_of_the_next_order(described, space, held, order):
+    scene, push, load = described()
+    values = {"forces": [0.5 * load, load], "displacements": [0.1, 0.2]}[held]
+    curve, finer = (simulated(scene, k, space).load_displacement(push, **{held: values}) for k in (order, order + 1))
+    checked = curve.checked_errors()
+    assert checked.checked.all()
+    expected = finer.values - curve.values + finer.error_estimates()
+    assert checked.errors == pytest.approx(expected, rel=1e-6)
+
+
+def test_errors_count_from_the_unloaded_configuration_in_finer_elements():
+    scene, posed, push = strained_by_a_motor()
+    curve, finer = (
+        simulated(scene, order, size=2.0).load_displacement(push, forces=[0.2], configuration=posed) for order in (1, 2)
+    )
+    assert curve.unloaded.has_reactions
+    checked = curve.checked_errors()
+    assert checked.errors == pytest.approx(finer.values - curve.values + finer.error_estimates(), rel=1e-6)
+
+
+@pytest.mark.parametrize(("order", "apart"), [(1, 1e-3), (2, 1e-6)], ids=["straight edges", "curved edges"])
+def test_errors_of_designs_are_those_of_their_shape(order, apart):
+    scene, push, load = arch()
+    curves = []
+    for k in (order, order + 1):
+        simulation = simulated(scene, k)
+        (link,) = scene.mechanism.flexible_links
+        target = fm.Target(push, force=load, displacement=1.0)
+        problem = fm.DesignProblem(simulation, [fm.SplineDesign(link, 2)], targets=[target])
+        parameters = problem.initial + 0.1 * np.arange(len(problem.initial)) / len(problem.initial)
+        designed = problem.simulation.with_design(problem.rest_shape(parameters))
+        curves.append(designed.load_displacement(push, forces=[load]))
+    curve, finer = curves
+    assert np.abs(curve.frames[0].design.field).max() > 0.01
+    checked = curve.checked_errors()
+    assert checked.checked.all()
+    assert checked.errors == pytest.approx(finer.values - curve.values + finer.error_estimates(), rel=apart)
+
+
+def test_errors_of_elements_that_bend_too_little_are_within_a_tenth(monkeypatch):
+    scene, push, load = arch()
+    curve = simulated(scene, 1).load_displacement(push, forces=[load])
+    refine(monkeypatch, 2)
+    true = simulated(scene, 3).load_displacement(push, forces=[load]).values - curve.values
+    assert curve.doubts() != ((),)
+    checked = curve.checked_errors()
+    assert checked.errors == pytest.approx(true, rel=0.1)
+    assert checked.doubts == ((),)
+
+
+def test_errors_of_the_highest_order_come_from_one_beyond():
+    scene, push, load = arch()
+    curve = simulated(scene, 3).load_displacement(push, forces=[load])
+    checked = curve.checked_errors()
+    assert checked.checked.all()
+    assert checked.errors == pytest.approx(curve.error_estimates(), rel=1.0)
+
+
+def test_limit_loads_that_finer_elements_do_not_bear_are_doubts():
+    scene, push = shallow_arch()
+    coarse, finer = (simulated(scene, order, size=2.0) for order in (1, 2))
+    values = list(np.linspace(0.1, 2.0, 20))
+    limits = [own.load_displacement(push, displacements=values).forces.max() for own in (coarse, finer)]
+    assert limits[1] < limits[0]
+    curve = coarse.load_displacement(push, forces=[0.3 * limits[1], 0.5 * sum(limits)])
+    checked = curve.checked_errors()
+    assert list(checked.checked) == [True, False]
+    assert checked.errors[1] == curve.error_estimates()[1]
+    ((), (reason,)) = checked.doubts
+    assert "no equilibrium is near in elements of the next order" in reason
+
+
+def test_plane_stress_is_estimated_in_finer_elements_at_one_frame_or_all():
+    scene, push, load = arch()
+    curves = [simulated(scene, order).load_displacement(push, forces=[0.5 * load, load]) for order in (1, 2)]
+    checked = curves[0].checked_errors(modelling=True)
+    assert checked.errors == pytest.approx(curves[1].modelling_errors(), rel=1e-6)
+    last = curves[0].checked_errors(modelling=True, frame=curves[0].frames[-1])
+    assert last.errors == pytest.approx(checked.errors[1:], rel=1e-9)
+    assert last.doubts == checked.doubts[1:]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
+def test_errors_are_the_same_on_any_number_of_processes(space):
+    scene, push, load = arch()
+    found = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        simulation = fm.Simulation(scene, space=space, order=1, size=4.0, comm=comm)
+        found.append(simulation.load_displacement(push, forces=[load]).checked_errors().errors)
+    assert found[1] == pytest.approx(found[0], rel=1e-5)
