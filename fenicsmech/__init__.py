@@ -210,10 +210,12 @@ from fenicsmech.report import Optimisation, Report, design_study, write_report
 from fenicsmech.simulation import (
     Axis,
     BucklingPoint,
+    CheckedErrors,
     Curve,
     Explanation,
     FollowedCurve,
     Frame,
+    FrameSeries,
     Hint,
     ModeShape,
     PathEvent,
@@ -271,7 +273,8 @@ __all__ = [
     "ConstantPredictor", "DoubtOptions", "StressPeak", "SingularPlace", "StressField", "EdgeStress",
     "StressOptions", "RecoveryOptions", "InterpolationOptions", "SingularityOptions",
     "Safety", "LinkSafety", "LawStability", "Life", "LinkLife", "SafeRange", "SafeLimit", "SafeRangeOptions",
-    "RestShape", "Curve", "Frame", "Axis", "Unknown", "Freedom", "Reaction", "Explanation", "Hint", "PinFriction",
+    "RestShape", "FrameSeries", "Curve", "CheckedErrors", "Frame", "Axis", "Unknown", "Freedom", "Reaction",
+    "Explanation", "Hint", "PinFriction",
     "write_report", "Report", "plot_curve", "CurveSeries", "CurveMark", "CurveTarget", "Trace", "read_csv",
     "print_once", "configure_logging", "mpi_abort_on_error",
     # quantities of equilibria; those from Observable on for quantities of your own

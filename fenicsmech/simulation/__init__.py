@@ -26,6 +26,7 @@ from fenicsmech.simulation.fields import (
 )
 from fenicsmech.simulation.following import FollowedCurve, PathEvent, Until
 from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode
+from fenicsmech.simulation.frame_series import FrameSeries
 from fenicsmech.simulation.omitted_effects import Explanation, Hint, PinFriction, weight_influence
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.safe_range import SafeLimit, SafeRange, SafeRangeOptions

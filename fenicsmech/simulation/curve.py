@@ -21,6 +21,7 @@ from fenicsmech.mechanism import DRAWN, FlexibleLink, Force, ForceGroup, Joint, 
 from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.curve_errors import CheckedErrors, CurveErrors
 from fenicsmech.simulation.fields import MechanismPlotter, gather, peak_mark, position, write_xdmf
+from fenicsmech.simulation.finer_elements import FinerElements
 from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.frame_series import FrameSeries
 from fenicsmech.simulation.omitted_effects import Explanation, ExplanationOptions, PinFriction, explain, friction_band
@@ -165,6 +166,21 @@ class Curve(FrameSeries):
         if frame is None:
             return errors.checked(kind, options)
         return CurveErrors(replace(self, frames=(self._chosen(frame),))).checked(kind, options, errors)
+
+    def in_finer_elements(self, frame: Frame | None = None) -> Frame:
+        """The equilibrium near that of a frame in elements of the next order on the same mesh, with all its quantities.
+
+        It shows what elements leave of those that have no estimate.
+
+        Args:
+            frame: one of the curve's; the last one by default.
+
+        Raises:
+            DescriptionError: motors move along the curve, or the frame is of another one.
+            EquilibriumError: no equilibrium is near.
+        """
+        self._need_force()
+        return FinerElements(self, DoubtOptions()).frame(self._chosen(frame))
 
     @cached_property
     def corrections(self) -> np.ndarray:

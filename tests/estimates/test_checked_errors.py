@@ -114,6 +114,17 @@ def test_plane_stress_is_estimated_in_finer_elements_at_one_frame_or_all():
     assert last.doubts == checked.doubts[1:]
 
 
+def test_frames_in_finer_elements_have_all_quantities_of_these():
+    scene, push, load = arch()
+    own, finer = (simulated(scene, order).load_displacement(push, forces=[0.5 * load, load]) for order in (2, 3))
+    for wanted, frame in zip(finer.frames, own.frames, strict=True):
+        found = own.in_finer_elements(frame)
+        assert found.displacement == pytest.approx(wanted.displacement, rel=1e-8)
+        assert found.strain_energy == pytest.approx(wanted.strain_energy, rel=1e-7)
+        assert found.peak.value == pytest.approx(wanted.peak.value, rel=1e-6)
+    assert own.in_finer_elements().force == load
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
 def test_errors_are_the_same_on_any_number_of_processes(space):
