@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -213,16 +214,16 @@ def _draw_legend(
         curve = group[0][0]
         colour, width, size = _line_style(_common([colour for _, colour in group]), faint=curve.faint)
         handles.append(mpl.Line2D([], [], color=colour, label=label, lw=width * curve.joined, marker="o", ms=size))
-    if any(curve.joined and not curve.stable.all() for curve in series):
-        look = {"ls": _DASHES, "lw": 2.0, "marker": "o", "ms": 4.5, "mfc": "white"}
-        handles.append(mpl.Line2D([], [], color=MUTED, label="unstable", **look))
-    if any(curve.joined and curve.snapped_through.any() for curve in series):
-        look = {"ls": _DOTS, "lw": 1.4, "marker": ">", "markevery": (1, 1), "ms": 5}
-        handles.append(mpl.Line2D([], [], color=MUTED, label="snap-through", **look))
-    if any(len(curve.corrected) for curve in series):
-        handles.append(
-            mpl.Line2D([], [], color=MUTED, lw=1.4, marker="|", markevery=(1, 1), ms=7, label="in finer elements")
-        )
+    unstable = [curve.joined and not curve.stable.all() for curve in series]
+    snaps = [curve.joined and curve.snapped_through.any() for curve in series]
+    corrected = [len(curve.corrected) > 0 for curve in series]
+    for label, shown, look in (
+        ("unstable", unstable, {"ls": _DASHES, "lw": 2.0, "marker": "o", "ms": 4.5, "mfc": "white"}),
+        ("snap-through", snaps, {"ls": _DOTS, "lw": 1.4, "marker": ">", "markevery": (1, 1), "ms": 5}),
+        ("in finer elements", corrected, {"lw": 1.4, "marker": "|", "markevery": (1, 1), "ms": 7}),
+    ):
+        if own := list(itertools.compress(colours, shown)):
+            handles.append(mpl.Line2D([], [], color=_common(own), label=label, **look))
     for kind, marker in _markers(series).items():
         handles.append(mpl.Line2D([], [], lw=0, marker=marker, ms=8, mfc="white", mec=INK, mew=1.5, label=kind))
     if targets:

@@ -182,3 +182,21 @@ def test_any_number_of_ranks_gives_the_same_peak():
     assert together.value == pytest.approx(alone.value, rel=1e-8)
     assert together.place == pytest.approx(alone.place, abs=1e-9)
     assert (together.link, together.left_out) == (alone.link, alone.left_out)
+
+
+@pytest.mark.thorough
+def test_finer_elements_show_what_one_element_through_a_bar_in_torsion_misses():
+    """Saint-Venant: τ = T / (0.2082 a³) in the middle of each side of a square bar."""
+    side, torque = 3.0, 0.02
+    rig = fm.Mechanism("torsion")
+    wall, hand = rig.rigid("wall", fixed=True), rig.rigid("hand")
+    bar = rig.flexible("bar", fm.strip([(0, 0), (40, 0)], thickness=side, depth=side), STEEL)
+    rig.clamp(wall, bar, end="start", length=4.0)
+    rig.clamp(hand, bar, end="end", length=4.0)
+    pair = [(rig.force(on=hand, at=(38, y), direction=(0, 0, z), name=f"{z}"), 1.0) for y, z in ((10, 1), (-10, -1))]
+    simulation = fm.Simulation(fm.Scene(rig), space="3d", size=side, layers=1, comm=MPI.COMM_SELF)
+    curve = simulation.load_displacement(fm.ForceGroup("couple", pair), forces=[torque / 20.0])
+    expected = np.sqrt(3.0) * torque / (0.2082 * side**3)
+    coarse, finer = curve.frames[0].peak, curve.in_finer_elements().peak
+    assert coarse.value < 0.75 * expected
+    assert finer.value == pytest.approx(expected, rel=0.03)
