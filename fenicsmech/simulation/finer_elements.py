@@ -31,7 +31,7 @@ from fenicsmech.equilibrium import (
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.estimates import DoubtOptions
 from fenicsmech.model import Design
-from fenicsmech.simulation.frame import Frame, Gauge
+from fenicsmech.simulation.frame import Frame, FrameRecorder
 from fenicsmech.simulation.frame_series import FrameSeries
 
 
@@ -55,7 +55,7 @@ class FinerElements:
             self._unloaded = self._lifted(curve.unloaded)
             if curve.unloaded.has_reactions:
                 self._unloaded = self._near(curve.unloaded, LoadControl(0.0)).state
-            self._gauge = Gauge(self._discretisation, self._solver.system, followed).zeroed(self._unloaded)
+            self._recorder = FrameRecorder(self._discretisation, self._solver.system, followed).zeroed(self._unloaded)
 
     def series(self, frames: Sequence[Frame]) -> FrameSeries:
         """Such ``frames``."""
@@ -70,11 +70,11 @@ class FinerElements:
         with self._shaped(frame.design):
             control: Control = LoadControl(frame.force)
             if self._curve.unknown is Unknown.FORCE:
-                control = DisplacementControl(frame.displacement + self._gauge.origin)
+                control = DisplacementControl(frame.displacement + self._recorder.origin)
             found = self._near(frame.state, control)
             if found.unstable_modes != frame.unstable_modes:
                 raise self._none("the one found is of another stability")
-            return self._gauge.frame(found)
+            return self._recorder.frame(found)
 
     def _near(self, state: State, control: Control) -> EquilibriumPoint:
         """The equilibrium that continues one of the curve's."""

@@ -294,7 +294,7 @@ class CurveFollower:
             first = crossing(path, event.critical, mode.step, sense)
         except NotConverged as failure:
             raise self._ended(failure) from failure
-        self._frames.append(self._stepper.gauge.frame(first))
+        self._frames.append(self._stepper.recorder.frame(first))
         return self._follow(path, first, lambda done: None)
 
     def _follow(self, path: ArcLengthStepper, start: EquilibriumPoint, watch: Callable[[int], None]) -> FollowedCurve:
@@ -310,7 +310,7 @@ class CurveFollower:
                     self._record_event(path, critical)
             except NotConverged as failure:
                 raise self._ended(failure) from failure
-            frame = stepper.gauge.frame(ends[1])
+            frame = stepper.recorder.frame(ends[1])
             self._frames.append(replace(frame, seconds=perf_counter() - began, phases=clock.since(seconds)))
             watch(min(len(self._frames), self._until.frames))  # critical points are additional frames
         return self._curve(self._frames)
@@ -337,7 +337,7 @@ class CurveFollower:
         else:
             step = critical.point.tangent
             steps = [step.scaled(1.0 / path.system.size(step))]
-        frame = self._stepper.gauge.frame(critical.point)
+        frame = self._stepper.recorder.frame(critical.point)
         modes = tuple(mode_shape(self._stepper.discretisation.model, step) for step in steps)
         self._events.append(PathEvent(critical.kind, frame, len(self._frames), modes, critical))
         self._frames.append(frame)
@@ -361,7 +361,7 @@ class CurveFollower:
 
     def _finishes(self, path: ArcLengthStepper) -> list[Finish]:
         """Displacements or positions first, then forces."""
-        origin, opposite = self._stepper.gauge.origin, self._followed.opposite
+        origin, opposite = self._stepper.recorder.origin, self._followed.opposite
         followed = path.value, path.value_rate, self._followed.at
 
         def prescribed(end: float) -> DisplacementControl | None:
@@ -379,7 +379,7 @@ class CurveFollower:
         """The conjugate of the followed value, the same on all processes; displacements count from the unloaded
         configuration."""
         self._system.load(state)
-        origin = 0.0 if self._followed.displaces else self._stepper.gauge.origin
+        origin = 0.0 if self._followed.displaces else self._stepper.recorder.origin
         return agreed(self._system.comm, self._followed.conjugate(self._system, state) - origin)
 
     def _ended(self, failure: NotConverged) -> EquilibriumError:

@@ -1,4 +1,4 @@
-"""Equilibria of a curve with their measured quantities, what measures them, and modes of their KKT matrices."""
+"""Equilibria of a curve with their measured quantities, and modes of their KKT matrices."""
 
 from __future__ import annotations
 
@@ -169,8 +169,8 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Gauge:
-    """What measures equilibria under a part, with zeros at one of them.
+class FrameRecorder:
+    """What makes frames of equilibria under a part, with displacements counted from one of them.
 
     Attributes:
         discretisation: of the scene.
@@ -186,8 +186,8 @@ class Gauge:
     origin: float = 0.0
     zeros: Mapping[Output, float] = field(default_factory=dict)
 
-    def zeroed(self, state: State) -> Gauge:
-        """The gauge that counts from ``state``; motors count from where they were drawn."""
+    def zeroed(self, state: State) -> FrameRecorder:
+        """The recorder that counts from ``state``; motors count from where they were drawn."""
         model, origin = self.discretisation.model, 0.0
         self.system.load(state)
         if not self.followed.displaces:

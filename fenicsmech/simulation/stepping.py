@@ -34,7 +34,7 @@ from fenicsmech.multibody import Assembly, BodyPoint, assemble_before_strain, co
 from fenicsmech.simulation.balance import Balance
 from fenicsmech.simulation.curve import Curve
 from fenicsmech.simulation.discretisation import Discretisation
-from fenicsmech.simulation.frame import Frame, Gauge
+from fenicsmech.simulation.frame import Frame, FrameRecorder
 from fenicsmech.simulation.request import CurveRequest
 from fenicsmech.simulation.rest_start import CurveStart, Effort, RestPose, RestPoses
 
@@ -52,7 +52,7 @@ class CurveStepper:
         freedom: mobility of the configuration.
         unloaded: the equilibrium without forces, effects at load factor 0.
         followed: the control whose value changes along the curve.
-        gauge: what measures equilibria, from the unloaded configuration.
+        recorder: of frames, which count from the unloaded configuration.
         adrift: whether nothing but loads holds the mechanism.
     """
 
@@ -70,7 +70,7 @@ class CurveStepper:
         idle = self._system.idle
         self.freedom = from_one(comm, lambda: count_freedom(rigid, assembly.poses, motors, springs, idle))
         self.followed = discretisation.followed_control(request.part)
-        self.gauge = Gauge(discretisation, self._system, self.followed)
+        self.recorder = FrameRecorder(discretisation, self._system, self.followed)
         self._poses, self._rigid_motors = assembly.poses, motors
         self._effort = Effort()  # on the way to the next frame
         with self._timed():
@@ -78,7 +78,7 @@ class CurveStepper:
         self.adrift = bool(self.freedom.zero_energy) and not state.has_reactions
         self._rest_poses = RestPoses(model, self._system, state, motors, request.others, request.part, request.where)
         self._start: CurveStart | None = None  # of the last load steps
-        self.gauge = self.gauge.zeroed(state)
+        self.recorder = self.recorder.zeroed(state)
 
     def start(self, control: Control) -> CurveStart:
         """Where load steps to ``control`` start: the present start, unless loads are found to prefer another pose.
@@ -144,7 +144,7 @@ class CurveStepper:
     def frame(self, control: Control) -> Frame:
         """The equilibrium under ``control``."""
         if control.constrained:
-            control = control.at(control.prescribed + self.gauge.origin)
+            control = control.at(control.prescribed + self.recorder.origin)
         start = self.start(control)
         steps = start.steps
         iterations, snaps = steps.iterations, steps.snaps
@@ -168,7 +168,7 @@ class CurveStepper:
                 if imbalance > _LOST and self.adrift and (found := self._reached(control, point)) is not None:
                     point, imbalance, spent = balance.improved(found, control)
                     self._effort += Effort(spent)
-            record = self.gauge.frame(point)
+            record = self.recorder.frame(point)
             if imbalance > _LOST:
                 names = ", ".join(map(repr, self.freedom.mobile))
                 lost = (
@@ -449,7 +449,7 @@ class CurveStepper:
     # -- failures ----------------------------------------------------------------------------------------------
 
     def _unreached(self, control: Control, failure: LoadStepsFailed) -> EquilibriumError:
-        last, where, zero = self._last(failure), self.request.where, self.gauge.origin
+        last, where, zero = self._last(failure), self.request.where, self.recorder.origin
         start = self._start
         assert start is not None, "steps that fail have started"
         if control.constrained and from_one(self.discretisation.comm, lambda: self._is_held(start.state)):
@@ -501,7 +501,7 @@ class CurveStepper:
 
     def _last(self, failure: LoadStepsFailed) -> Frame | None:
         """The last equilibrium reached, on the way to a prescribed value too."""
-        return None if failure.last is None else self.gauge.frame(failure.last)
+        return None if failure.last is None else self.recorder.frame(failure.last)
 
     def _is_held(self, state: State) -> bool:
         """Whether no motion that the joints leave at ``state`` moves the force's point along its direction."""
