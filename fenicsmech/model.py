@@ -43,6 +43,7 @@ from fenicsmech.mechanism import (
     Output,
     Scene,
     Shape,
+    StepPart,
     in_dimension,
     validate,
 )
@@ -182,6 +183,12 @@ def fits(scene: Scene, model: ElasticModel) -> bool:
     except DescriptionError:
         return False
     return True
+
+
+def spatial_model(scene: Scene, shapes: Sequence[Shape]) -> ElasticModel:
+    """The model of a scene in space: of half the depth where that is symmetric, and no file holds whole links."""
+    half = fits(scene, MID_PLANE_SYMMETRIC) and not any(isinstance(shape, StepPart | MeshPart) for shape in shapes)
+    return MID_PLANE_SYMMETRIC if half else SPATIAL
 
 
 def check_links(

@@ -71,4 +71,3 @@ from fenicsmech.design.shape.shape_map import LinkParameters, ShapeMap, ShapeReq
 from fenicsmech.design.shape.spline import ControlLayout, LinkSpline, SplineSamples, fit_spline, lay_out
 from fenicsmech.design.shape.weights import insert, lumped_mass, pierced, solve_partition, stiffness
 from fenicsmech.design.target import Comparison, Target, limits
-from fenicsmech.design.transfer import whole_state

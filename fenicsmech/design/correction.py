@@ -34,10 +34,10 @@ from fenicsmech.design.result import DesignResult, Reached
 from fenicsmech.design.run import Checkpoint, DesignIterate, DesignProgress, Optimum, Round, Saved, minimise_together
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import MET, Comparison, check_sensitivities
-from fenicsmech.design.transfer import WholeState
 from fenicsmech.errors import EquilibriumError, set_options
 from fenicsmech.log import logger
 from fenicsmech.quantities import Sample
+from fenicsmech.simulation import WholeState
 
 _log = logger(__name__)
 _FINER = 1e-2  # tolerance of a minimum that misses a target, over the optimiser's own

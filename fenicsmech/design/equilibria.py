@@ -40,7 +40,6 @@ from mpi4py import MPI
 from fenicsmech.collective import agreed
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.target import Target, sample_request
-from fenicsmech.design.transfer import WholeState, guess, whole_state
 from fenicsmech.equilibrium import (
     Adjoint,
     Control,
@@ -63,7 +62,7 @@ from fenicsmech.quantities import (
     Sample,
     Sensitivity,
 )
-from fenicsmech.simulation import Simulation
+from fenicsmech.simulation import Simulation, WholeState, guess, whole_state
 
 
 @dataclass(frozen=True)

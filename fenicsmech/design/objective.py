@@ -23,9 +23,9 @@ from fenicsmech.design.regularisers import Model, Regulariser
 from fenicsmech.design.rest_shape import ParametricShape
 from fenicsmech.design.shape.handle_optimum import HandlePlacement, ShapeError
 from fenicsmech.design.target import Comparison, Target
-from fenicsmech.design.transfer import WholeState
 from fenicsmech.log import Clock
 from fenicsmech.quantities import Sample
+from fenicsmech.simulation import WholeState
 
 _SPLITS = MPI.Comm.Create_keyval()  # attribute of a communicator: its splits by their number, each made once
 

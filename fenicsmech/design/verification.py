@@ -24,7 +24,6 @@ from fenicsmech.design.equilibria import DesignEquilibria, SampleEquilibria
 from fenicsmech.design.optimisers.problem import Infeasible
 from fenicsmech.design.result import DesignResult, PartValue, component_values, solid_files
 from fenicsmech.design.target import Comparison, Target
-from fenicsmech.design.transfer import WholeState
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, SPATIAL
 from fenicsmech.errors import DescriptionError, MeshingError, positive
 from fenicsmech.export import write_step
@@ -34,7 +33,7 @@ from fenicsmech.meshing import LinkMesh
 from fenicsmech.model import Design, Fidelity, fits
 from fenicsmech.multibody import JointChange, PlacedPoint
 from fenicsmech.quantities import Sample
-from fenicsmech.simulation import Simulation
+from fenicsmech.simulation import Simulation, WholeState
 
 _log = logger(__name__)
 

@@ -30,9 +30,9 @@ from fenicsmech.collective import from_one
 from fenicsmech.elasticity import MID_PLANE_SYMMETRIC, PLANE_STRESS, SPATIAL, ElasticModel, Formulation, Quadrature
 from fenicsmech.errors import counted, positive, set_options
 from fenicsmech.log import logger
-from fenicsmech.mechanism import FlexibleLink, MeshPart, Scene, StepPart
+from fenicsmech.mechanism import FlexibleLink, Scene
 from fenicsmech.meshing import link_thickness
-from fenicsmech.model import Fidelity, check_scene, fits, per_link
+from fenicsmech.model import Fidelity, check_scene, fits, per_link, spatial_model
 
 _log = logger(__name__)
 
@@ -241,9 +241,7 @@ class AccuracyControl:
             for link, given in per_link(scene.mechanism, thickness).items()
         }
         self._planar = fidelity_levels(PLANE_STRESS) if fits(scene, PLANE_STRESS) else []
-        # files hold whole links
-        half = fits(scene, MID_PLANE_SYMMETRIC) and not any(isinstance(x.shape, StepPart | MeshPart) for x in links)
-        self._spatial = fidelity_levels(MID_PLANE_SYMMETRIC if half else SPATIAL)
+        self._spatial = fidelity_levels(spatial_model(scene, [link.shape for link in links]))
         check_scene(scene, self._spatial[0].model)
         self.level = (self._planar or self._spatial)[0]
 

@@ -9,7 +9,8 @@
 - ``following``: curves along a path until an end, with its events
 - ``safe_range``: the range of a force that links bear
 - ``frame``, ``frame_series``, ``curve``: results and their evaluation
-- ``curve_errors``: errors of a curve's values; ``finer_elements``: equilibria of a curve in those of the next order
+- ``curve_errors``: errors of a curve's values; ``recomputed``: its frames in another discretisation
+- ``transfer``: the equilibrium of one simulation as a guess of that of another one
 - ``fields``: gathering, pictures and files of states
 - ``omitted_effects``: assumptions as text, hints where they matter, and friction in hinges
 """
@@ -31,3 +32,4 @@ from fenicsmech.simulation.omitted_effects import Explanation, Hint, PinFriction
 from fenicsmech.simulation.request import CurveRequest, read_request
 from fenicsmech.simulation.safe_range import SafeLimit, SafeRange, SafeRangeOptions
 from fenicsmech.simulation.simulation import RestShape, Simulation
+from fenicsmech.simulation.transfer import WholeState, guess, whole_state

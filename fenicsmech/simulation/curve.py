@@ -21,10 +21,10 @@ from fenicsmech.mechanism import DRAWN, FlexibleLink, Force, ForceGroup, Joint, 
 from fenicsmech.plot import Arrow, CurveSeries, Panel, Trace, draw_configurations, plot_curve
 from fenicsmech.simulation.curve_errors import CheckedErrors, CurveErrors
 from fenicsmech.simulation.fields import MechanismPlotter, gather, peak_mark, position, write_xdmf
-from fenicsmech.simulation.finer_elements import FinerElements
 from fenicsmech.simulation.frame import BucklingPoint, Frame, ModeShape, SoftMode, mode_shape
 from fenicsmech.simulation.frame_series import FrameSeries
 from fenicsmech.simulation.omitted_effects import Explanation, ExplanationOptions, PinFriction, explain, friction_band
+from fenicsmech.simulation.recomputed import Recomputed
 from fenicsmech.stress import EdgeStress, LinkSurface, StressField, allowables, von_mises
 
 _log = logger(__name__)
@@ -148,12 +148,12 @@ class Curve(FrameSeries):
     def checked_errors(
         self, options: DoubtOptions | None = None, *, modelling: bool = False, frame: Frame | None = None
     ) -> CheckedErrors:
-        """Errors as ``error_estimates`` or ``modelling_errors``, each from an equilibrium in finer elements.
+        """Errors as ``error_estimates`` or ``modelling_errors``, each from an equilibrium elsewhere.
 
-        The equilibrium of a frame is sought again in elements of the next order on the same mesh, from its own as the
-        guess: how the value changes there, and the estimate there, make up the error; of plane stress the estimate
-        there does. Much of what is said against estimates (``doubts``) holds no more then. What such elements need is
-        compiled and kept for further calls.
+        The equilibrium of a frame is sought again, from its own as the guess: in elements of the next order on the
+        same mesh, and for errors of plane stress in such elements in space, too. How the value changes, and estimates
+        there, make up the error (``simulation.recomputed``). Much of what is said against estimates (``doubts``) holds
+        no more then. What the other elements need is compiled and kept for further calls.
 
         Args:
             options: when errors are in doubt.
@@ -162,10 +162,10 @@ class Curve(FrameSeries):
 
         Raises as ``error_estimates``, or ``modelling_errors``.
         """
-        kind, options, errors = _kind(modelling), options or DoubtOptions(), self._errors
-        if frame is None:
-            return errors.checked(kind, options)
-        return CurveErrors(replace(self, frames=(self._chosen(frame),))).checked(kind, options, errors)
+        options, errors = options or DoubtOptions(), self._errors
+        if frame is not None:
+            errors = CurveErrors(replace(self, frames=(self._chosen(frame),)))
+        return errors.checked(_kind(modelling), options)
 
     def in_finer_elements(self, frame: Frame | None = None) -> Frame:
         """The equilibrium near that of a frame in elements of the next order on the same mesh, with all its quantities.
@@ -180,7 +180,7 @@ class Curve(FrameSeries):
             EquilibriumError: no equilibrium is near.
         """
         self._need_force()
-        return FinerElements(self, DoubtOptions()).frame(self._chosen(frame))
+        return Recomputed(self, self.discretisation.finer, DoubtOptions()).frame(self._chosen(frame))
 
     @cached_property
     def corrections(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Errors of the values of one curve: estimates, what speaks against them, and errors from finer elements.
+"""Errors of the values of one curve: estimates, what speaks against them, and errors from equilibria elsewhere.
 
 Displacements count from the unloaded configuration: its own error is taken from theirs, or moves with the place that a
 prescribed one counts from.
@@ -28,10 +28,11 @@ from fenicsmech.estimates import (
 )
 from fenicsmech.log import logger
 from fenicsmech.mechanism import Output
-from fenicsmech.simulation.finer_elements import FinerElements
+from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame
 from fenicsmech.simulation.frame_series import FrameSeries
 from fenicsmech.simulation.omitted_effects import ExplanationOptions
+from fenicsmech.simulation.recomputed import Recomputed
 
 _log = logger(__name__)
 _AT_POINT = "force at a point of a flexible link"
@@ -39,7 +40,7 @@ _AT_POINT = "force at a point of a flexible link"
 
 @dataclass(frozen=True, eq=False)
 class CheckedErrors:
-    """Errors of the values of a curve, from equilibria in finer elements.
+    """Errors of the values of a curve, from equilibria in finer elements or in space.
 
     Attributes:
         errors: to be added to the values, (frames,); estimates where there is no such equilibrium near.
@@ -50,6 +51,23 @@ class CheckedErrors:
     errors: np.ndarray
     checked: np.ndarray
     doubts: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Elsewhere:
+    """Values of a curve in another discretisation, NaN where no equilibrium is near.
+
+    Attributes:
+        values: of the curve's unknown, (frames,).
+        rest: estimates of what elements leave of them, (frames,).
+        growth: with each halving of the elements, without limit, (frames,).
+        failures: why there is none, by frame.
+    """
+
+    values: np.ndarray
+    rest: np.ndarray
+    growth: np.ndarray
+    failures: Mapping[int, str]
 
 
 class CurveErrors:
@@ -71,18 +89,13 @@ class CurveErrors:
                 self._keep(kind, output, column - less)
         return [self._known[kind, output].copy() for kind in kinds]
 
-    def doubts(self, kind: ErrorKind, options: DoubtOptions, like: CurveErrors | None = None) -> list[tuple[str, ...]]:
-        """Why estimates of a kind may be off by more than a factor of two, for every frame.
-
-        Args:
-            kind: of the errors.
-            options: when estimates are in doubt.
-            like: errors of a curve whose largest values count; this one's by default.
-        """
+    def doubts(self, kind: ErrorKind, options: DoubtOptions) -> list[tuple[str, ...]]:
+        """Why estimates of a kind may be off by more than a factor of two, for every frame."""
         curve, origin = self._curve, Origin()
         if (unloaded := self._moved_origin) is not None:
             origin = Origin.at(self._estimates, self._solver, unloaded, kind)
-        given, largest = (like or self)._largest
+        prescribed = curve.displacements if curve.unknown is Unknown.FORCE else curve.forces
+        given, largest = np.abs(prescribed).max(), self._largest
         scale = largest / given if given else np.inf
         at = map(curve.equilibrium, curve.frames)
         own = [examined(self._estimates, self._solver, one, kind, origin, scale, options) for one in at]
@@ -96,42 +109,45 @@ class CurveErrors:
         }
         return [first + reasons for first, (_, reasons) in zip(_reasons(of_curve, len(own)), own, strict=True)]
 
-    def checked(self, kind: ErrorKind, options: DoubtOptions, like: CurveErrors | None = None) -> CheckedErrors:
-        """Errors of a kind from finer elements, estimates where there is no equilibrium; arguments as of ``doubts``."""
+    def checked(self, kind: ErrorKind, options: DoubtOptions) -> CheckedErrors:
+        """Errors of a kind from equilibria elsewhere: in finer elements, or in space; estimates where there is none."""
+        here, (errors,) = self._curve.discretisation, self.estimated([kind])
+        zero = np.zeros(len(errors))
+        before, after = _Elsewhere(self._curve.values, zero, zero, {}), self._elsewhere(here.finer, options)
+        if kind is ErrorKind.PLANE_STRESS:
+            before, after = after, self._elsewhere(here.finer.in_space, options)
+        rest = after.rest - before.rest
+        found = after.values - before.values + rest
+        checked = np.isfinite(found)
+        errors[checked] = found[checked]
+        said = {
+            "most of the error is an estimate": np.abs(rest) > options.left * np.abs(errors),
+            _AT_POINT: after.growth > options.growth * np.abs(errors),
+        }
+        failures = [tuple(own.failures[k] for own in (before, after) if k in own.failures) for k in range(len(errors))]
+        doubts = [first or own for first, own in zip(failures, _reasons(said, len(errors)), strict=True)]
+        return CheckedErrors(errors, checked, tuple(doubts))
+
+    def _elsewhere(self, discretisation: Discretisation, options: DoubtOptions) -> _Elsewhere:
+        """The values in another discretisation."""
         curve, found = self._curve, dict[int, Frame]()
-        (errors,) = self.estimated([kind])
-        doubts: list[tuple[str, ...]] = [()] * len(errors)
+        missing = np.full(len(curve.frames), np.nan)
+        values, rest, growth, failures = missing, missing.copy(), missing.copy(), {}
         try:
-            finer = FinerElements(curve, options)
+            other = Recomputed(curve, discretisation, options)
         except EquilibriumError as failure:
-            return CheckedErrors(errors, np.zeros(len(errors), bool), ((failure.problem,),) * len(errors))
+            return _Elsewhere(values, rest, growth, dict.fromkeys(range(len(missing)), failure.problem))
         for k, frame in enumerate(curve.frames):
             try:
-                found[k] = finer.frame(frame)
+                found[k] = other.frame(frame)
             except EquilibriumError as failure:
-                doubts[k] = (failure.problem,)
-        at = np.array(list(found), dtype=int)
+                failures[k] = failure.problem
         if found:
-            series = finer.series(tuple(found.values()))
+            at, series = list(found), other.series(tuple(found.values()))
             there = CurveErrors(series)
-            (rest,) = there.estimated([kind])
-            if kind is ErrorKind.ELEMENTS:
-                errors[at] = series.values - curve.values[at] + rest
-                left = there._left(rest, errors[at], options)
-            else:
-                errors[at], left = rest, there.doubts(kind, options, like or self)
-            for k, own in zip(found, left, strict=True):
-                doubts[k] = own
-        return CheckedErrors(errors, np.isin(np.arange(len(errors)), at), tuple(doubts))
-
-    def _left(self, rest: np.ndarray, errors: np.ndarray, options: DoubtOptions) -> list[tuple[str, ...]]:
-        """Doubts that are left of ``errors`` of the elements that this curve finds, its own estimates ``rest`` among
-        them, (frames,) each."""
-        said = {
-            "most of the error left in the next order": np.abs(rest) > options.left * np.abs(errors),
-            _AT_POINT: np.abs(self.growth()) > options.growth * np.abs(errors),
-        }
-        return _reasons(said, len(errors))
+            values[at], (rest[at],) = series.values, there.estimated([ErrorKind.ELEMENTS])
+            growth[at] = np.abs(there.growth())
+        return _Elsewhere(values, rest, growth, failures)
 
     def growth(self, kind: ElasticModel | None = None) -> np.ndarray:
         """``Curve.growth_by_halving`` in an elastic model, that of the curve by default."""
@@ -152,16 +168,14 @@ class CurveErrors:
         return self._curve.solver
 
     @property
-    def _largest(self) -> tuple[float, float]:
-        """The largest prescribed value and the largest value of the curve."""
-        curve = self._curve
-        prescribed = curve.displacements if curve.unknown is Unknown.FORCE else curve.forces
-        return float(np.abs(prescribed).max()), float(np.abs(curve.values).max())
+    def _largest(self) -> float:
+        """The largest value of the curve."""
+        return float(np.abs(self._curve.values).max())
 
     def _keep(self, kind: ErrorKind, output: Output | None, errors: np.ndarray) -> None:
         """Keeps estimates, (frames,), and warns of values that have no limit."""
         self._known[kind, output] = errors
-        growth, (_, largest) = np.abs(self.growth()).max(), self._largest
+        growth, largest = np.abs(self.growth()).max(), self._largest
         if kind is ErrorKind.ELEMENTS and output is None and growth > ExplanationOptions().tolerance * largest:
             _log.warning("%s (each halving adds %.2g of it)", cause_of_growth(self._curve.part), growth / largest)
 

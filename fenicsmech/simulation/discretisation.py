@@ -29,7 +29,7 @@ from fenicsmech.mechanism import (
     check_units,
 )
 from fenicsmech.meshing import MechanismMesh
-from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism
+from fenicsmech.model import Fidelity, MechanismModel, check_links, mesh_mechanism, spatial_model
 from fenicsmech.multibody import JointChange, PlacedPoint, build_linkage
 from fenicsmech.stress import StressOptions, StressRecovery
 
@@ -107,6 +107,14 @@ class Discretisation:
         other.mesh = self.mesh
         return other
 
+    @cached_property
+    def in_space(self) -> Discretisation:
+        """The same scene in space, in elements as large, of order 3 at most."""
+        fidelity, order = self.fidelity, min(self.fidelity.order, 3)
+        model = spatial_model(self.scene, list(self.shapes.values()))
+        rule = Quadrature.for_order(order, model.dim)
+        return self.at(replace(fidelity, model=model, order=order, quadrature=rule), self.clock, self.comm)
+
     def with_material(self, drawn: Material, other: Material) -> Discretisation:
         """The same scene on the same mesh, with links of another material instead of ``drawn``."""
         for given in (drawn, other):
@@ -117,7 +125,7 @@ class Discretisation:
         changed.linkage = build_linkage(self.scene.mechanism, self.fidelity.model.mechanism_dim, self.moved)
         changed.materials = tuple(other if material == drawn else material for material in self.materials)
         changed.mesh, changed._solvers = self.mesh, {}
-        for name in ("model", "estimates", "stresses", "finer"):
+        for name in ("model", "estimates", "stresses", "finer", "in_space"):
             changed.__dict__.pop(name, None)
         return changed
 

@@ -15,8 +15,9 @@ import numpy as np
 
 import fenicsmech as fm
 from fenicsmech import model
-from fenicsmech.design import Infeasible, SampleEquilibria, whole_state
+from fenicsmech.design import Infeasible, SampleEquilibria
 from fenicsmech.meshing import LinkMesh, cutting
+from fenicsmech.simulation import whole_state
 
 from ...simulation.refined import quartered
 from .blueprint import Blueprint, Built, build

@@ -18,8 +18,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenicsmech.compat import cell_dofs
+from fenicsmech.elasticity import ElasticBody
 from fenicsmech.equilibrium import State
-from fenicsmech.model import MechanismModel
+from fenicsmech.model import Design, MechanismModel
 from fenicsmech.multibody import shape_functions
 
 _NEAREST = 16  # cells with the nearest midpoints, among which a point is located
@@ -84,6 +85,28 @@ def guess(model: MechanismModel, found: WholeState, like: State) -> State:
     )
     model.load(state)
     return replace(state, u=model.elastic.values())
+
+
+def carried_design(model: MechanismModel, design: Design, other: MechanismModel) -> Design:
+    """The ``design`` of a model on another one of the same drawing, read where that one's nodes are drawn."""
+    elastic, mesh, dim = model.elastic, model.mesh.mesh, model.elastic.model.dim
+    cells = cell_dofs(elastic.shape.function_space)[: mesh.topology.index_map(mesh.topology.dim).size_local]
+    drawn, values = _drawn(elastic), design.field.reshape(-1, dim)
+    own = drawn[cells], model.mesh.link[: len(cells)], values[cells]
+    rest, link, field = (np.concatenate(part) for part in zip(*mesh.comm.allgather(own), strict=True))
+    there, points = cell_dofs(other.elastic.shape.function_space), _drawn(other.elastic)[:, :dim]
+    carried = np.zeros((len(points), other.elastic.model.dim))
+    for index in np.unique(other.mesh.link):
+        nodes = np.unique(there[other.mesh.link == index])
+        carried[nodes, :dim] = _read(rest[link == index], field[link == index], points[nodes])
+    return replace(design, field=carried.ravel())
+
+
+def _drawn(elastic: ElasticBody) -> np.ndarray:
+    """X₀ + c of this rank's nodes of the design field, ghosts last, (nodes, dim)."""
+    dim = elastic.model.dim
+    nodes = elastic.shape.function_space.tabulate_dof_coordinates()[:, :dim]
+    return nodes + elastic.drawn_shape.reshape(-1, dim)
 
 
 def _rest(model: MechanismModel) -> np.ndarray:

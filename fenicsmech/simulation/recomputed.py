@@ -1,12 +1,13 @@
-"""Equilibria of a curve in elements of the next order on the same mesh, from those of the curve.
+"""Frames of a curve in another discretisation of its scene, with the equilibria of the curve as guesses.
 
-Displacements of order k are some of those of order k + 1, so that an equilibrium is a guess there as it is: a few steps
-of Newton's method lead to the one near. With the estimate η of its own error, the error of a value Q is
+In elements of the next order on the same mesh, with the estimate η of their own error, the error of a value Q is
 
     Q(u) − Q(u_k) ≈ Q(u_(k+1)) − Q(u_k) + η(u_(k+1)),
 
-to all orders in the error of the displacement but for what η leaves. It is within a factor of two where η is and
-|η| < ½ |Q(u_(k+1)) − Q(u_k) + η|. Edges of designs of order 1 stay straight.
+to all orders in the error of the displacement but for what η leaves. What space adds to plane stress is the difference
+of values in space and in plane stress, both in elements of order k + 1 (3 at most in space) and with their estimates.
+Either is within a factor of two where the estimates are, and less than half of it. Edges of designs of order 1 stay
+straight.
 """
 
 from __future__ import annotations
@@ -15,10 +16,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-import numpy as np
-from dolfinx import fem
-
-from fenicsmech.compat import owned_values
 from fenicsmech.equilibrium import (
     Control,
     DisplacementControl,
@@ -31,31 +28,34 @@ from fenicsmech.equilibrium import (
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.estimates import DoubtOptions
 from fenicsmech.model import Design
+from fenicsmech.simulation.discretisation import Discretisation
 from fenicsmech.simulation.frame import Frame, FrameRecorder
 from fenicsmech.simulation.frame_series import FrameSeries
+from fenicsmech.simulation.transfer import carried_design, guess, whole_state
 
 
-class FinerElements:
-    """Frames of a curve in elements of the next order.
+class Recomputed:
+    """Frames of a curve in another discretisation.
 
     Args:
         curve: the curve.
+        discretisation: the other one, of the same scene.
         options: when an equilibrium continues one of the curve's.
 
     Raises:
         EquilibriumError: no unloaded equilibrium is near.
     """
 
-    def __init__(self, curve: FrameSeries, options: DoubtOptions) -> None:
-        self._options, self._curve, self._coarse = options, curve, curve.discretisation.model
-        self._discretisation, part = curve.discretisation.finer, curve.part
-        self._solver = self._discretisation.solver(part, [other for other, _ in curve.others])
-        followed = self._discretisation.followed_control(part)
+    def __init__(self, curve: FrameSeries, discretisation: Discretisation, options: DoubtOptions) -> None:
+        self._curve, self._discretisation, self._options = curve, discretisation, options
+        self._own, self._other = curve.discretisation.model, discretisation.model
+        self._solver = discretisation.solver(curve.part, [other for other, _ in curve.others])
+        followed = discretisation.followed_control(curve.part)
         with self._shaped(curve.frames[0].design):
-            self._unloaded = self._lifted(curve.unloaded)
+            self._unloaded = self._guess(curve.unloaded)
             if curve.unloaded.has_reactions:
                 self._unloaded = self._near(curve.unloaded, LoadControl(0.0)).state
-            self._recorder = FrameRecorder(self._discretisation, self._solver.system, followed).zeroed(self._unloaded)
+            self._recorder = FrameRecorder(discretisation, self._solver.system, followed).zeroed(self._unloaded)
 
     def series(self, frames: Sequence[Frame]) -> FrameSeries:
         """Such ``frames``."""
@@ -79,7 +79,7 @@ class FinerElements:
     def _near(self, state: State, control: Control) -> EquilibriumPoint:
         """The equilibrium that continues one of the curve's."""
         solver, system = self._solver, self._solver.system
-        start = control.prepare(self._lifted(state))
+        start = control.prepare(self._guess(state))
         try:
             found = solver.solve(start, control)
         except NotConverged as failure:
@@ -91,33 +91,29 @@ class FinerElements:
             raise self._none("a fold lies between")
         return found
 
-    def _lifted(self, state: State) -> State:
-        """An equilibrium of the curve, in elements of the next order."""
-        coarse, fine = self._coarse.elastic, self._discretisation.model.elastic
-        self._coarse.load(state)
-        values = []
-        for own, other in zip(fine.fields, [*coarse.fields, None], strict=False):
-            lifted = fem.Function(own.function_space)
-            if other is not None:
-                lifted.interpolate(other)
-            values.append(owned_values(lifted).copy())
-        return replace(state, u=np.concatenate(values))
+    def _guess(self, state: State) -> State:
+        """An equilibrium of the curve as a guess."""
+        other = self._other
+        poses = other.linkage.joints.space.converted(state.poses)
+        like = other.assembled_state(poses, state.motors)
+        return guess(
+            other,
+            whole_state(self._own, state),
+            replace(like, constant=state.constant, minimum_shift=state.minimum_shift, unstable=state.unstable),
+        )
 
     @contextmanager
     def _shaped(self, design: Design) -> Iterator[None]:
         """A context in which both models have a design of the curve."""
-        coarse, fine = self._coarse, self._discretisation.model
-        field = fem.Function(coarse.elastic.shape.function_space)
-        field.x.array[:] = design.field
-        lifted = fem.Function(fine.elastic.shape.function_space)
-        lifted.interpolate(field)
-        with coarse.shaped(design), fine.shaped(replace(design, field=lifted.x.array)):
+        own, other = self._own, self._other
+        same = own.mesh is other.mesh and own.elastic.shape.x.array.size == other.elastic.shape.x.array.size
+        with own.shaped(design), other.shaped(design if same else carried_design(own, design, other)):
             yield
 
     def _none(self, reason: str) -> EquilibriumError:
-        curve = self._curve
+        curve, fidelity = self._curve, self._discretisation.fidelity
         return EquilibriumError(
             f"{curve.part.name!r} in configuration {curve.configuration.name!r}",
-            f"no equilibrium is near in elements of the next order ({reason})",
+            f"no equilibrium is near in elements of order {fidelity.order} in {fidelity.model.name} ({reason})",
             "Use smaller elements",
         )
