@@ -46,8 +46,8 @@ class DoubtOptions:
         cancelled: least estimate over the bound of the contributions of cells.
         unresolved: largest part of the adjoint's energy that the elements miss.
         growth: largest growth with each halving of the elements, by forces at points, over the estimate.
-        left: largest estimate in finer elements over the error that they find: where it is off by a factor of two, the
-            error is off by no more.
+        left: largest estimate in finer elements over the error that they find, and growth there with another halving:
+            where these are off by a factor of two, the error is off by no more.
         miss: of a step back from finer elements, over the step: up to 2.2 on one branch, 30 and more across folds.
         rounding: misses up to this part of the mechanism's length, or rad, count as none.
 

@@ -122,7 +122,7 @@ class CurveErrors:
         errors[checked] = found[checked]
         said = {
             "most of the error is an estimate": np.abs(rest) > options.left * np.abs(errors),
-            _AT_POINT: after.growth > options.growth * np.abs(errors),
+            _AT_POINT: after.growth > options.left * np.abs(errors),  # the next order sees one halving, about
         }
         failures = [tuple(own.failures[k] for own in (before, after) if k in own.failures) for k in range(len(errors))]
         doubts = [first or own for first, own in zip(failures, _reasons(said, len(errors)), strict=True)]
