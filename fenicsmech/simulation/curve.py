@@ -160,7 +160,8 @@ class Curve(FrameSeries):
             modelling: those of plane stress.
             frame: the one of the curve's whose errors are wanted; all by default.
 
-        Raises as ``error_estimates``, or ``modelling_errors``.
+        Raises as ``error_estimates`` or ``modelling_errors``, and a DescriptionError where the frame is of another
+        curve or the scene cannot be simulated in space.
         """
         options, errors = options or DoubtOptions(), self._errors
         if frame is not None:
