@@ -106,6 +106,8 @@ class Balance:
         """``state`` moved along motions that deform no link to where works along these vanish."""
         for _ in range(_ITERATIONS):
             motions = self._motions(state)
+            if not motions:  # a dead centre
+                break
             works = self._works(state, control, motions)
             slopes = np.array([self._slope(state, control, motions, works, k) for k in range(len(motions))])
             # of one process: signs of slopes are decisions that depend on rounding
