@@ -15,6 +15,7 @@
 - ``omitted_effects``: assumptions as text, hints where they matter, and friction in hinges
 """
 
+from fenicsmech.simulation.balance import Balance
 from fenicsmech.simulation.curve import Axis, Curve
 from fenicsmech.simulation.curve_errors import CheckedErrors
 from fenicsmech.simulation.fields import (

@@ -5,7 +5,7 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.equilibrium import LoadControl
-from fenicsmech.simulation.balance import Balance
+from fenicsmech.simulation import Balance
 
 from .refined import cantilever
 
