@@ -46,12 +46,10 @@ def derivatives(space: str, angle: float, stiff: float | None) -> np.ndarray:
     return gradient.numbers
 
 
-@pytest.mark.parametrize(
-    ("space", "stiff"), [("plane-stress", 2e8), pytest.param("3d", 5e7, marks=pytest.mark.thorough)]
-)
+@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("angle", [0.1, 0.8])
-def test_derivatives_of_a_motors_torque_keep_their_digits_beside_a_stiff_leaf(space, stiff, angle):
+def test_derivatives_of_a_motors_torque_keep_their_digits_beside_a_stiff_leaf(space, angle):
     rigid = derivatives(space, angle, None)
-    # by stiffness alone, 2.5e4 times the leg's or more, derivatives differ by some 1e-6; its rounding, 1e-16 E b ℓ²
-    # √n at n nodes, more in space, leaves as much of the torque's derivative by the angle
-    assert derivatives(space, angle, stiff) == pytest.approx(rigid, rel=1e-5)
+    # by stiffness alone, 2.5e4 times the leg's, derivatives differ by some 1e-6; its rounding, 1e-16 E b ℓ² √n at n
+    # nodes, more in space, leaves as much of the torque's derivative by the angle
+    assert derivatives(space, angle, 5e7) == pytest.approx(rigid, rel=1e-5)
