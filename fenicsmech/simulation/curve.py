@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -60,6 +60,8 @@ def axes(part: PrescribedPart, units: Units) -> tuple[Axis, Axis]:
 class Curve(FrameSeries):
     """Frames of one configuration; methods compute at the rest shape that these belong to."""
 
+    _estimates: dict[tuple[ErrorKind, Output | None], np.ndarray] = field(default_factory=dict, init=False)
+
     def __repr__(self) -> str:
         (across, up), first, last = self.axes, self.frames[0], self.frames[-1]
         unstable, frames = int(np.sum(~self.stable)), counted(len(self.frames), "frame")
@@ -92,10 +94,10 @@ class Curve(FrameSeries):
 
     # -- errors --------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def _errors(self) -> CurveErrors:
         self._need_force()
-        return CurveErrors(self)
+        return CurveErrors(self, self._estimates)
 
     def error_estimates(self, *, output: Output | None = None) -> np.ndarray:
         """Estimated discretisation errors of ``values``, (frames,), to be added to them; computed once.

@@ -71,11 +71,17 @@ class _Elsewhere:
 
 
 class CurveErrors:
-    """The errors of a ``curve``; estimates are kept."""
+    """The errors of a ``curve``.
 
-    def __init__(self, curve: FrameSeries) -> None:
-        self._curve = curve
-        self._known: dict[tuple[ErrorKind, Output | None], np.ndarray] = {}
+    Args:
+        curve: the curve.
+        known: estimates made before, (frames,) each, to which others are added.
+    """
+
+    def __init__(
+        self, curve: FrameSeries, known: dict[tuple[ErrorKind, Output | None], np.ndarray] | None = None
+    ) -> None:
+        self._curve, self._known = curve, {} if known is None else known
 
     def estimated(self, kinds: Sequence[ErrorKind], output: Output | None = None) -> list[np.ndarray]:
         """Estimates of errors of each kind, (frames,) each; those not known yet from one adjoint per frame."""
