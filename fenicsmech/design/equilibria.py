@@ -457,10 +457,7 @@ class SampleEquilibria:
         system, control = path.solver.system, path.control(unloaded)
         start = control.prepare(guess(self._model, other, unloaded))
         found = self._solved(path, start, control)
-        self._model.load(start)
-        missing = system.residual(start, control).vector
-        system.unknowns.turn(found.state.poses)
-        missed = found.linearisation.missed(start, found.state, missing, self._options.rounding)
+        missed = path.solver.missed(start, found, self._options.rounding)
         distance, motion = (system.size(system.difference(start, other)) for other in (found.state, unloaded))
         farthest = max(self._options.farthest_transfer * motion, self._options.rounding)
         if missed > self._options.largest_transfer_miss or distance > farthest:

@@ -133,6 +133,13 @@ class EquilibriumSolver(ABC):
             raise NotConverged("the KKT matrix at the equilibrium cannot be factored", iterations)
         return Linearisation(self.system, self.linear, state, control, residual)
 
+    def missed(self, start: State, found: EquilibriumPoint, rounding: float) -> float:
+        """How far one step back from an equilibrium ``found`` misses its guess ``start``: ``Linearisation.missed``."""
+        self.system.load(start)
+        missing = self.system.residual(start, found.control).vector
+        self.system.unknowns.turn(found.state.poses)
+        return found.linearisation.missed(start, found.state, missing, rounding)
+
     def hides(self, state: State, control: Control) -> bool:
         """Whether the rounding of stiff links hides what resists some motion at a ``state``."""
         try:

@@ -78,16 +78,12 @@ class Recomputed:
 
     def _near(self, state: State, control: Control) -> EquilibriumPoint:
         """The equilibrium that continues one of the curve's."""
-        solver, system = self._solver, self._solver.system
         start = control.prepare(self._guess(state))
         try:
-            found = solver.solve(start, control)
+            found = self._solver.solve(start, control)
         except NotConverged as failure:
             raise self._none(failure.reason) from failure
-        system.load(start)
-        missing = system.residual(start, control).vector
-        system.unknowns.turn(found.state.poses)
-        if found.linearisation.missed(start, found.state, missing, self._options.rounding) > self._options.miss:
+        if self._solver.missed(start, found, self._options.rounding) > self._options.miss:
             raise self._none("a fold lies between")
         return found
 
