@@ -138,7 +138,9 @@ class PlanarSpace(RigidSpace):
 
     def symbolic_rotation(self, parameters):
         (angle,) = parameters
-        return sympy.Matrix([[sympy.cos(angle), -sympy.sin(angle)], [sympy.sin(angle), sympy.cos(angle)]])
+        # not cos θ, whose difference from one loses the digits of small turns
+        sine, cosine = sympy.sin(angle), 1 - 2 * sympy.sin(angle / 2) ** 2
+        return sympy.Matrix([[cosine, -sine], [sine, cosine]])
 
     def rotation_rates(self, pose):
         return np.ones((1, 1))

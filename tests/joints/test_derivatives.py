@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from .cases import CASES, DRIVEN, compiled, draw
-from .poses import carry, random_pose
+from .poses import carry, pose, random_pose, turn
 from .taylor import assert_derivative
 
 EVERY_JOINT = pytest.mark.parametrize(
@@ -79,6 +79,19 @@ def test_every_joint_closes_exactly_as_drawn(case, driven):
     for far in (1.0, 1e6):
         value = compiled(case, driven=driven).value(drawn.identity, far * drawn.anchors, drawn.triad, 0.0)
         assert np.max(np.abs(value), initial=0.0) <= 4e-16  # rounding of the triad only, wherever the joint is
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case.kind.shares_point], ids=str)
+@SEEDS
+def test_points_that_a_tiny_turn_parts_keep_the_digits_of_their_distance(case, seed):
+    # φ × anchor + ½ φ × (φ × anchor): the rounding of cos φ is a hundred times the second term
+    rng = np.random.default_rng(seed)
+    drawn, axis = draw(case.space, rng), rng.standard_normal(2 * case.dim - 3)
+    turned = pose(case.space, np.zeros(case.dim), turn(case.space, 1e-9 * axis / np.linalg.norm(axis)))
+    z = np.concatenate([case.space.identity, turned])
+    apart = compiled(case).value(z, drawn.anchors, drawn.triad, 0.0)[: case.dim]
+    (expected,) = case.space.displace(turned, drawn.anchors[1:])
+    assert np.linalg.norm(apart - expected) <= 1e-14 * np.linalg.norm(expected)
 
 
 @EVERY_JOINT
