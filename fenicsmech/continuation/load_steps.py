@@ -374,9 +374,10 @@ class LoadStepper(Stepper):
         try:
             return self._beyond_steps(control, failure, way.tried, hidden, longer=longer)
         except LoadStepsFailed:
-            if not way.aside:
+            ahead = [value for value in way.aside if (value - self._value) * step > 0.0]
+            if not ahead:
                 raise
-        way.beyond = way.aside.pop(min(way.aside, key=lambda value: abs(value - self._value)))
+        way.beyond = way.aside.pop(min(ahead, key=lambda value: abs(value - self._value)))
         return way.beyond
 
     @property

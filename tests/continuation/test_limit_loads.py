@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,6 +82,27 @@ def test_load_steps_after_the_first_locate_it_as_closely_and_a_load_on_the_way_b
         path.advance(LoadControl(beyond))
     assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
     assert path.advance(LoadControl(-0.5)).state.force == -0.5
+
+
+class FoundElsewhereOnce(OneFreedom):
+    """The first solve above 0.3, under contact, ends on another path."""
+
+    contact, elsewhere = object(), False
+
+    def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
+        point = super().solve(start, control)
+        if control.prescribed < 0.3 or self.elsewhere:
+            return point
+        self.elsewhere = True
+        return replace(point, state=replace(point.state, u=point.state.u + 5.0))
+
+
+def test_equilibria_kept_under_contact_that_steps_have_passed_are_not_returned_to():
+    path = LoadStepper(FoundElsewhereOnce(), start(), LoadControl(), predictor=HermitePredictor())
+    with pytest.raises(LoadStepsFailed) as failure:
+        path.advance(LoadControl(3.0))
+    assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
+    assert path.solver.elsewhere and path.snaps == 0
 
 
 @pytest.fixture(scope="module")
