@@ -458,6 +458,12 @@ class Adjoint:
         """dQ/dφ by motors that move by ``direction``, (connections,)."""
         return self.x.dot(self.at.motor_rate(direction))
 
+    @property
+    def imbalance(self) -> float:
+        """Σ |x_i r_i|, a bound of what the residual r that the equilibrium is left with changes Q by."""
+        own = float(np.abs(self.x.array_r * self.at.residual.vector.array_r).sum())
+        return self.x.comm.tompi4py().allreduce(own)
+
     @staticmethod
     def of_force(at: Linearisation) -> Adjoint:
         """The adjoint of the controlled force under displacement control."""

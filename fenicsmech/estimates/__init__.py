@@ -15,7 +15,7 @@ from fenicsmech.estimates.accuracy_control import (
     Trial,
     fidelity_levels,
 )
-from fenicsmech.estimates.doubts import DoubtOptions, Origin, examined
+from fenicsmech.estimates.doubts import ROUNDED, DoubtOptions, Origin, examined
 from fenicsmech.estimates.estimates import (
     Calibration,
     Equilibrium,

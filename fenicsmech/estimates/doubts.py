@@ -21,6 +21,7 @@ Estimates η are of first order, sums over cells, and of quantities that converg
   alone. Springs and compliant interfaces move the quantity too, and hide how much of the links' part is missed. What
   they miss, as how contraction varies over the thickness, the estimate of plane stress misses as well.
 - The force acts at a point of a flexible link, whose displacement has no limit (``point_forces``).
+- The equilibrium itself is known to rounding only: its residual r changes Q by up to Σ |z_i r_i|, above half of |η|.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from fenicsmech.estimates.estimates import Equilibrium, ErrorKind, Estimates, ad
 
 TURNS = {Unknown.DISPLACEMENT: "limit point near", Unknown.FORCE: "turning point of the displacement near"}
 _NO_TANGENT = "tangent not defined"
+ROUNDED = "equilibrium known to rounding only"
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class DoubtOptions:
         unresolved: largest part of the adjoint's energy that the elements miss.
         growth: largest growth with each halving of the elements, by forces at points, over the estimate.
         left: largest estimate in finer elements over the error that they find, and growth there with another halving:
-            where these are off by a factor of two, the error is off by no more.
+            where these are off by a factor of two, the error is off by no more. Of residuals over errors, too.
         miss: of a step back from finer elements, over the step: up to 2.2 on one branch, 30 and more across folds.
         rounding: misses up to this part of the mechanism's length, or rad, count as none.
 
@@ -118,6 +120,7 @@ def examined(
         own = estimates.bounded(adjoint, kind)
         slope = adjoint.by_control()
         error = own.error + slope * origin.error if force else own.error - origin.error
+        imbalance = adjoint.imbalance
         bound = own.bound + (abs(slope) * origin.bound if force else origin.bound)
         # the adjoint of the conjugate of a control is the rate along the path, but for its sign
         at = adjoint.at
@@ -139,6 +142,8 @@ def examined(
         reasons.append("contributions of elements cancel")
     if own.unresolved > options.unresolved:
         reasons.append("elements too large")
+    if imbalance > options.left * abs(error):
+        reasons.append(ROUNDED)
     return error, tuple(reasons)
 
 

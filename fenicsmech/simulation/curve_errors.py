@@ -6,8 +6,8 @@ prescribed one counts from.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,12 +16,14 @@ from fenicsmech.elasticity import SPATIAL, ElasticModel
 from fenicsmech.equilibrium import EquilibriumSolver, PointLoad, Unknown
 from fenicsmech.errors import EquilibriumError
 from fenicsmech.estimates import (
+    ROUNDED,
     AccuracyOptions,
     DoubtOptions,
     Equilibrium,
     ErrorKind,
     Estimates,
     Origin,
+    adjoint_at,
     cause_of_growth,
     examined,
     growth_by_halving,
@@ -36,6 +38,8 @@ from fenicsmech.simulation.recomputed import Recomputed
 
 _log = logger(__name__)
 _AT_POINT = "force at a point of a flexible link"
+_ESTIMATED = "most of the error is an estimate"
+_HIGHEST = 4  # order of finer elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +56,57 @@ class CheckedErrors:
     checked: np.ndarray
     doubts: tuple[tuple[str, ...], ...]
 
+    def but(self, at: Sequence[int], others: CheckedErrors) -> CheckedErrors:
+        """These, but for the frames with the numbers ``at``, for which ``others`` hold where an equilibrium is near."""
+        errors, doubts = self.errors.copy(), list(self.doubts)
+        for k, error, checked, own in zip(at, others.errors, others.checked, others.doubts, strict=True):
+            if checked:
+                errors[k], doubts[k] = error, own
+        return replace(self, errors=errors, doubts=tuple(doubts))
+
 
 @dataclass(frozen=True, eq=False)
 class _Elsewhere:
-    """Values of a curve in another discretisation, NaN where no equilibrium is near.
+    """Frames of a curve in another discretisation.
 
     Attributes:
-        values: of the curve's unknown, (frames,).
-        rest: estimates of what elements leave of them, (frames,).
-        growth: with each halving of the elements, without limit, (frames,).
+        count: of the curve's frames.
+        found: the numbers of those near which there is an equilibrium.
+        series: these equilibria, None without any.
         failures: why there is none, by frame.
     """
 
-    values: np.ndarray
-    rest: np.ndarray
-    growth: np.ndarray
+    count: int
+    found: Sequence[int]
+    series: FrameSeries | None
     failures: Mapping[int, str]
+
+    @property
+    def values(self) -> np.ndarray:
+        """Of the curve's unknown, (count,), NaN where no equilibrium is near."""
+        return self._all(lambda series: series.values)
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Estimates of what elements leave of them, (count,)."""
+        return self._all(lambda series: CurveErrors(series).estimated([ErrorKind.ELEMENTS])[0])
+
+    @property
+    def growth(self) -> np.ndarray:
+        """Growth of values that have no limit with each halving of the elements, (count,)."""
+        return self._all(lambda series: np.abs(CurveErrors(series).growth()))
+
+    @property
+    def imbalance(self) -> np.ndarray:
+        """Bounds of what residuals change values by, (count,), see ``CurveErrors``."""
+        return self._all(lambda series: CurveErrors(series).imbalance)
+
+    def _all(self, some: Callable[[FrameSeries], np.ndarray]) -> np.ndarray:
+        """What ``some`` gives for the frames found, NaN for the others."""
+        every = np.full(self.count, np.nan)
+        if self.series is not None:
+            every[list(self.found)] = some(self.series)
+        return every
 
 
 class CurveErrors:
@@ -116,44 +155,77 @@ class CurveErrors:
         return [first + reasons for first, (_, reasons) in zip(_reasons(of_curve, len(own)), own, strict=True)]
 
     def checked(self, kind: ErrorKind, options: DoubtOptions) -> CheckedErrors:
-        """Errors of a kind from equilibria elsewhere: in finer elements, or in space; estimates where there is none."""
-        here, (errors,) = self._curve.discretisation, self.estimated([kind])
-        zero = np.zeros(len(errors))
-        before, after = _Elsewhere(self._curve.values, zero, zero, {}), self._elsewhere(here.finer, options)
+        """Errors of a kind from equilibria elsewhere: in finer elements, or in space; estimates where there is none.
+
+        Where most of an error of elements in the plane is still an estimate, values in three orders say more.
+        """
+        finer, own = self._curve.discretisation.finer, self._curve.values
+        there = self._elsewhere(finer, options)
         if kind is ErrorKind.PLANE_STRESS:
-            before, after = after, self._elsewhere(here.finer.in_space, options)
-        rest = after.rest - before.rest
-        found = after.values - before.values + rest
-        checked = np.isfinite(found)
-        errors[checked] = found[checked]
+            space = self._elsewhere(finer.in_space, options)
+            return self._found(kind, space.values - there.values, space.rest - there.rest, (there, space), options)
+        (before,), first = self.estimated([kind]), there.values - own
+        left = _left(first, before, there.rest)
+        found = self._found(kind, first + left, left, (there,), options)
+        again = [k for k, doubts in enumerate(found.doubts) if _ESTIMATED in doubts]
+        if not again or finer.fidelity.order == _HIGHEST or finer.fidelity.model.dim == 3:
+            return found
+        some = CurveErrors(replace(self._curve, frames=tuple(self._curve.frames[k] for k in again)))
+        further = some._elsewhere(finer.finer, options)
+        # Aitken's Δ²:  Q − Q₂ ≈ d₂² / (d₁ − d₂) after differences d₁ = Q₁ − Q₀, d₂ = Q₂ − Q₁
+        first, second = first[again], further.values - there.values[again]
+        falls = np.abs(second) < np.abs(first)
+        left = np.divide(second**2, first - second, out=np.full(len(again), np.nan), where=falls)
+        return found.but(again, some._found(kind, first + second + left, left, (further,), options))
+
+    def _found(
+        self,
+        kind: ErrorKind,
+        errors: np.ndarray,
+        left: np.ndarray,
+        elsewhere: Sequence[_Elsewhere],
+        options: DoubtOptions,
+    ) -> CheckedErrors:
+        """Errors of a kind that were found ``elsewhere``, of which some is ``left`` to estimates, (frames,) each."""
+        checked, count = np.isfinite(errors), len(errors)
+        if not checked.all():
+            (estimates,) = self.estimated([kind])
+            errors = np.where(checked, errors, estimates)
+        least = options.left * np.abs(errors)
         said = {
-            "most of the error is an estimate": np.abs(rest) > options.left * np.abs(errors),
-            _AT_POINT: after.growth > options.left * np.abs(errors),  # the next order sees one halving, about
+            _ESTIMATED: np.abs(left) > least,
+            _AT_POINT: elsewhere[-1].growth > least,  # the next order sees one halving, about
+            ROUNDED: self.imbalance + sum(own.imbalance for own in elsewhere) > least,
         }
-        failures = [tuple(own.failures[k] for own in (before, after) if k in own.failures) for k in range(len(errors))]
-        doubts = [first or own for first, own in zip(failures, _reasons(said, len(errors)), strict=True)]
+        failures = [tuple(own.failures[k] for own in elsewhere if k in own.failures) for k in range(count)]
+        doubts = [first or own for first, own in zip(failures, _reasons(said, count), strict=True)]
         return CheckedErrors(errors, checked, tuple(doubts))
 
     def _elsewhere(self, discretisation: Discretisation, options: DoubtOptions) -> _Elsewhere:
-        """The values in another discretisation."""
-        curve, found = self._curve, dict[int, Frame]()
-        missing = np.full(len(curve.frames), np.nan)
-        values, rest, growth, failures = missing, missing.copy(), missing.copy(), {}
+        """The frames in another discretisation."""
+        frames, found, failures = self._curve.frames, dict[int, Frame](), dict[int, str]()
         try:
-            other = Recomputed(curve, discretisation, options)
+            other = Recomputed(self._curve, discretisation, options)
         except EquilibriumError as failure:
-            return _Elsewhere(values, rest, growth, dict.fromkeys(range(len(missing)), failure.problem))
-        for k, frame in enumerate(curve.frames):
+            return _Elsewhere(len(frames), [], None, dict.fromkeys(range(len(frames)), failure.problem))
+        for k, frame in enumerate(frames):
             try:
                 found[k] = other.frame(frame)
             except EquilibriumError as failure:
                 failures[k] = failure.problem
-        if found:
-            at, series = list(found), other.series(tuple(found.values()))
-            there = CurveErrors(series)
-            values[at], (rest[at],) = series.values, there.estimated([ErrorKind.ELEMENTS])
-            growth[at] = np.abs(there.growth())
-        return _Elsewhere(values, rest, growth, failures)
+        series = other.series(tuple(found.values())) if found else None
+        return _Elsewhere(len(frames), list(found), series, failures)
+
+    @cached_property
+    def imbalance(self) -> np.ndarray:
+        """Bounds of what residuals change values by, of equilibria known to rounding only, (frames,); 0 of others."""
+        curve, bounds = self._curve, np.zeros(len(self._curve.frames))
+        for k, frame in enumerate(curve.frames):
+            if frame.residuals[-1] > self._solver.options.tolerance:
+                own = curve.equilibrium(frame)
+                with self._estimates.shaped(own.design):
+                    bounds[k] = adjoint_at(self._solver, own).imbalance
+        return bounds
 
     def growth(self, kind: ElasticModel | None = None) -> np.ndarray:
         """``Curve.growth_by_halving`` in an elastic model, that of the curve by default."""
@@ -202,6 +274,16 @@ class CurveErrors:
         if output is not None:
             return origin, self._estimates.at(self._solver, at, kinds, output)
         return origin, nothing if self._curve.unknown is Unknown.FORCE else origin
+
+
+def _left(fall: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The error left in finer elements, from estimates η₀ ``before`` and η₁ ``after`` it fell by d, (frames,) each.
+
+    Estimates that overstate how it falls overstate what is left: min(1, θ) η₁ with θ = d / (η₀ − η₁) > 0, else η₁.
+    """
+    stated = before - after
+    part = np.divide(fall, stated, out=np.ones_like(fall), where=stated != 0.0)
+    return after * np.where((part > 0.0) & (part < 1.0), part, 1.0)
 
 
 def _reasons(said: Mapping[str, np.ndarray], count: int) -> list[tuple[str, ...]]:
