@@ -24,5 +24,6 @@ from fenicsmech.estimates.estimates import (
     PressureError,
     Recovery,
     adjoint_at,
+    check_plane_stress,
 )
 from fenicsmech.estimates.point_forces import cause_of_growth, growth_by_halving

@@ -100,7 +100,7 @@ from fenicsmech.compat import (
     tensor_space,
     vector_space,
 )
-from fenicsmech.elasticity import PLANE_STRESS, ElasticBody
+from fenicsmech.elasticity import PLANE_STRESS, ElasticBody, ElasticModel
 from fenicsmech.equilibrium import (
     Adjoint,
     DisplacementControl,
@@ -446,6 +446,16 @@ class PressureError:
         self._interpolated.x.scatter_forward()
 
 
+def check_plane_stress(model: ElasticModel) -> None:
+    """Raises a DescriptionError unless a ``model`` with an error of plane stress is in question."""
+    if model is not PLANE_STRESS:
+        raise DescriptionError(
+            "modelling error",
+            f"only plane stress has one that is known, and space={model.name!r}",
+            "Simulate in plane stress, or in 3D",
+        )
+
+
 class PlaneStressError:
     """Errors of plane stress relative to 3D, for quantities of one model, which holds the equilibrium in question.
 
@@ -455,12 +465,7 @@ class PlaneStressError:
 
     def __init__(self, model: MechanismModel) -> None:
         self._elastic = elastic = model.elastic
-        if elastic.model is not PLANE_STRESS:
-            raise DescriptionError(
-                "modelling error",
-                f"only plane stress has an estimate, and space={elastic.model.name!r}",
-                "Simulate in plane stress, or in 3D",
-            )
+        check_plane_stress(elastic.model)
         V, smooth = (scalar_space(elastic.mesh, order) for order in (elastic.order, max(elastic.order - 1, 1)))
         a, v = fem.Function(V, name="contraction"), fem.Function(elastic.u.function_space, name="curling")
         p, q = (fem.Function(smooth, name=name) for name in ("free_contraction", "blocked_contraction"))

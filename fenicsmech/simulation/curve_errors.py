@@ -25,6 +25,7 @@ from fenicsmech.estimates import (
     Origin,
     adjoint_at,
     cause_of_growth,
+    check_plane_stress,
     examined,
     growth_by_halving,
 )
@@ -158,12 +159,15 @@ class CurveErrors:
         """Errors of a kind from equilibria elsewhere: in finer elements, or in space; estimates where there is none.
 
         Where most of an error of elements in the plane is still an estimate, values in three orders say more.
+
+        Raises a DescriptionError where the error is that of plane stress and the curve is in another model.
         """
-        finer, own = self._curve.discretisation.finer, self._curve.values
-        there = self._elsewhere(finer, options)
+        own, finer = self._curve.values, self._curve.discretisation.finer
         if kind is ErrorKind.PLANE_STRESS:
-            space = self._elsewhere(finer.in_space, options)
+            check_plane_stress(finer.fidelity.model)
+            there, space = (self._elsewhere(other, options) for other in (finer, finer.in_space))
             return self._found(kind, space.values - there.values, space.rest - there.rest, (there, space), options)
+        there = self._elsewhere(finer, options)
         (before,), first = self.estimated([kind]), there.values - own
         left = _left(first, before, there.rest)
         found = self._found(kind, first + left, left, (there,), options)
