@@ -122,7 +122,6 @@ def _lowest(
     """``eigenvalues`` of a second derivative, scaled."""
     scaled = (sparse.diags(scale) @ second.hessian @ sparse.diags(scale)).tocsc()
     slope = scale * second.slope if led else None
-    # a singular matrix has no inverse
     values = None if every or scaled.shape[0] <= _DENSE or potential.blueprint.spins else _nearest(scaled, slope)
     if values is None or values.min() < 0.0:
         values = np.linalg.eigvalsh(_restricted(scaled.toarray(), slope))
@@ -159,16 +158,21 @@ def _travel_rates(potential: Potential, u: np.ndarray, places: list[Place], ways
     return np.array([float(np.imag(potential.led_travel(potential.nodal(u, at), at))) for at in there]) / _IMAGINARY
 
 
-def _nearest(matrix: sparse.csc_matrix, slope: np.ndarray | None) -> np.ndarray:
-    """Four eigenvalues, those nearest to zero; ``slope`` as in ``_restricted``."""
-    if slope is None:
-        solve = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
-    else:
-        bordered = _bordered(matrix, slope)
+def _nearest(matrix: sparse.csc_matrix, slope: np.ndarray | None) -> np.ndarray | None:
+    """Four eigenvalues, those nearest to zero; ``slope`` as in ``_restricted``. None where the matrix is singular."""
+    try:
+        if slope is None:
+            solve = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve
+        else:
+            bordered = _bordered(matrix, slope)
 
-        def solve(b: np.ndarray) -> np.ndarray:
-            return bordered(np.append(b, 0.0))[:-1]
+            def solve(b: np.ndarray) -> np.ndarray:
+                return bordered(np.append(b, 0.0))[:-1]
 
+    except RuntimeError as singular:
+        if "singular" not in str(singular):
+            raise
+        return None
     return eigsh(matrix, k=4, sigma=0.0, OPinv=LinearOperator(matrix.shape, matvec=solve), return_eigenvectors=False)
 
 
