@@ -101,9 +101,9 @@ def test_the_check_sees_a_hundredth_of_every_effect(space, order, effect, option
 
 @pytest.mark.parametrize("pressures", [(), (PressurePlan("left", 5.0),), (PressurePlan("left", -5.0),)])
 def test_loads_balance_with_tension_in_links_that_all_but_leave_them_free(pressures):
-    """Taut links in line turn by 1e-10 under a load of 2e-10 of their tension, which does all the work against it, part
+    """Taut links in line turn by 5e-10 under a load of 1e-9 of their tension, which does all the work against it, part
     of it as pressure."""
-    scene, load = arch("plane-stress", 2, PrestrainPlan("right", 0.999, None), *pressures), 2e-9
+    scene, load = arch("plane-stress", 2, PrestrainPlan("right", 0.999, None), *pressures), 1e-8
     taut = [replace(link, centreline=tuple((x, 0.0) for x, _ in link.centreline)) for link in scene.links[1:]]
     joints = tuple(replace(joint, at=(joint.at[0], 0.0)) for joint in scene.joints)
     forces = (ForcePlan("load", "left", (30.0, 0.0), (0.0, -1.0)),)
@@ -112,7 +112,7 @@ def test_loads_balance_with_tension_in_links_that_all_but_leave_them_free(pressu
     (frame,) = built.curve(scene).frames
     potential = Potential.of(scene, built.simulation)
     found = check(potential, frame, 0.0)
-    assert found.scale > 1e9 * load and found.unstrained_work < THRESHOLDS.balanced
+    assert found.scale > 2e8 * load and found.unstrained_work < THRESHOLDS.balanced
     pulled = check(potential, replace(frame, force=1.01 * load), 0.0)
     assert pulled.unstrained_work > 100.0 * THRESHOLDS.balanced
 
