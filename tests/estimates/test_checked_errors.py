@@ -1,4 +1,4 @@
-"""Errors in doubt come from equilibria in elements of the next order, which are those of a curve from zero load."""
+"""Errors in doubt come from equilibria in elements of the next orders, which are those of curves from zero load."""
 
 from __future__ import annotations
 
