@@ -89,7 +89,8 @@ class LoadSteps:
         motion: largest motion of a step along the tangent (measured).
         failures: steps in a row without equilibrium after which stepping fails: halved as often, a step is 1e-12 of
             itself. Those before an equilibrium that was reached do not count.
-        failures_held: likewise where joints and motors hold the point that is to move.
+        failures_held: likewise where joints and motors hold the point that is to move; and ``failures_hidden`` where
+            links can move without deforming.
         failures_falling: likewise where links first move as rigid bodies to where something resists.
         failures_hidden: to one value, in a row or not, after which stepping fails where the rounding of stiff links
             hides what resists.
@@ -101,6 +102,7 @@ class LoadSteps:
         contact_residual: of a prediction in which other points touch, over that of the last equilibrium, above which
             it is discarded. Between 10 and 100 iterations are the same.
         iterations: after as many or fewer in a step, the next one is twice as long.
+        steady: steps of one length after which the next one is as well: iterations may not depend on it.
         deviation: of the rate over a step from the tangents at its ends, over the largest rate, that counts as a snap;
             that of kinks is smaller.
         branching_rate: largest rate of a step off a bifurcation, over the rate at its end.
@@ -132,6 +134,7 @@ class LoadSteps:
     largest_prediction: float = 1.0
     contact_residual: float = 10.0
     iterations: int = 5
+    steady: int = 16
     deviation: float = 0.2
     branching_rate: float = 2.2
     smallest_snap: float = 1e-4
@@ -153,6 +156,7 @@ class LoadSteps:
             failures_hidden=1,
             failures_inverted=1,
             iterations=1,
+            steady=1,
             arc_steps=1,
             snap_iterations=1,
         )
@@ -226,6 +230,7 @@ class _Way:
         beyond: the nearest equilibrium that was found past a fold.
         aside: under contact, where kinks look like snaps, equilibria beyond, by their values.
         halved: whether steps were.
+        steady: steps since one was halved or doubled.
     """
 
     control: Control
@@ -239,6 +244,7 @@ class _Way:
     beyond: EquilibriumPoint | None = None
     aside: dict[float, EquilibriumPoint] = field(default_factory=dict)
     halved: bool = False
+    steady: int = 0
 
 
 class LoadStepper(Stepper):
@@ -310,11 +316,11 @@ class LoadStepper(Stepper):
             if self._value == control.prescribed:
                 self._remember(point)
                 return point
-            way.failed, way.beyond = 0, None
+            way.failed, way.beyond, way.steady = 0, None, way.steady + 1
             if changed and not way.halved:
                 way.step = control.prescribed - self._value
-            elif point.iterations <= self._steps.iterations:
-                way.step *= 2.0
+            elif point.iterations <= self._steps.iterations or way.steady >= self._steps.steady:
+                way.step, way.steady = 2.0 * way.step, 0
 
     def _next(self, way: _Way) -> tuple[EquilibriumPoint, bool]:
         """The next equilibrium on the way, and whether it is beyond a snap.
@@ -334,7 +340,7 @@ class LoadStepper(Stepper):
                 return found, found is way.beyond or self._snapped(found)
             if not snapped or abs(value - self._value) <= self._steps.smallest_snap_step * self._scale(way.distance):
                 return point, snapped
-            way.step, way.beyond, way.halved = 0.5 * (value - self._value), point, True
+            way.step, way.beyond, way.halved, way.steady = 0.5 * (value - self._value), point, True, 0
             if self.system.contact is not None:
                 way.aside[value] = point
 
@@ -359,12 +365,12 @@ class LoadStepper(Stepper):
         """
         steps, step = self._steps, 0.5 * (control.prescribed - self._value)
         way.tried.append(control.prescribed)
-        way.failed, way.halved, way.step = way.failed + 1, True, step
+        way.failed, way.halved, way.step, way.steady = way.failed + 1, True, step, 0
         way.inverts |= isinstance(failure, InvertedGuess) and way.failed >= steps.failures_inverted
         smallest = steps.smallest if way.beyond is None else steps.smallest_snap_step
         ended = abs(step) <= smallest * self._scale(way.distance) or way.failed >= way.most
-        hidden = False
-        if len(way.tried) >= steps.failures_hidden or (ended and way.beyond is None):
+        hidden, many = False, len(way.tried) >= steps.failures_hidden and self._fold(control.prescribed) is None
+        if many or (ended and way.beyond is None):
             hidden = self._plain.hides(self._last.state if self._last else self._start, control.at(self._value))
         if not (ended or hidden):
             return None

@@ -106,7 +106,7 @@ class CurveStepper:
         if control.constrained and self._springs_below_rounding:
             steps = replace(steps, failures=steps.failures_hidden)
         if self.freedom.mobility:  # loads balance along motions that deform no link, whatever is hidden
-            steps = replace(steps, failures_hidden=steps.failures)
+            steps = replace(steps, failures_hidden=steps.failures_held)
         shifts = steps.least_shifts(state.minimum_shift, loads_resist=resist)
         kind = DisplacementControl() if control.constrained else LoadControl()
         if control.constrained and from_one(self.discretisation.comm, lambda: self._is_held(state)):
