@@ -86,7 +86,7 @@ test-thorough: install-test ## those marked `thorough`, on ranks if they are `pa
 	$(call heading,thorough tests)
 	$(SERIAL) -m "thorough and not parallel and $(SELECT)" $(TESTS)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and thorough and $(SELECT)" $(TESTS)
-	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider tests/simulation/test_ranks.py
+	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "not thorough" tests/simulation/test_ranks.py
 
 test-slow: install-test ## the tests marked `slow`
 	$(call heading,slow tests)

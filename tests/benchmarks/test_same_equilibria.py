@@ -74,7 +74,7 @@ def test_curve_of_a_finger_in_the_plane_at_prescribed_displacements(solver):
 
 @pytest.mark.thorough
 @pytest.mark.parallel
-@each_solver
+@each_method
 def test_curve_of_a_finger_in_space_on_any_number_of_ranks(solver):
     assert_alike(solver, "3d", "forces", (0.5, 1.0), order=1, size=8.0)
 

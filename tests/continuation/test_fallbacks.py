@@ -36,16 +36,24 @@ class Stubborn(OneFreedom):
         longest: step that succeeds.
         alike: whether solves fail in the same way whatever the least shift.
         enduring: the same with more iterations; by default it finds nothing.
+        hidden: whether rounding hides what resists.
+        iterations: of a solve that succeeds.
     """
 
-    def __init__(self, longest: float, *, alike: bool = False, enduring: Stubborn | None = None) -> None:
-        super().__init__()
+    def __init__(
+        self,
+        longest: float,
+        *,
+        alike: bool = False,
+        enduring: Stubborn | None = None,
+        hidden: bool = False,
+        iterations: int = 4,
+    ) -> None:
+        super().__init__(hidden=hidden)
+        self.needed = iterations
         self.longest, self.alike, self.enduring, self.reached = longest, alike, enduring, 0.0
         self.tried: list[tuple[float, float]] = []  # prescribed value and least shift of each solve
         self.failed = 0
-
-    def hides(self, state: State, control: LoadControl) -> bool:
-        return False
 
     def patient(self, factor: int) -> Stubborn:
         assert factor == LoadSteps().snap_iterations
@@ -59,7 +67,7 @@ class Stubborn(OneFreedom):
         self.reached = control.prescribed
         tangent = Step(np.ones(1), np.zeros(0), np.zeros(0), 1.0)
         state = State(np.array([self.reached]), np.zeros((0, 1)), np.zeros(0), self.reached, np.zeros(0))
-        return EquilibriumPoint(state, control, tangent, 1.0, Stability(0, 0), 4, (0.0,), None)
+        return EquilibriumPoint(state, control, tangent, 1.0, Stability(0, 0), self.needed, (0.0,), None)
 
 
 def stepper(path: Stubborn, *, minimum_shift: float = 0.0) -> LoadStepper:
@@ -100,6 +108,13 @@ def test_where_no_turn_is_seen_one_longer_solve_comes_before_the_end():
     assert found in failure.value.tried
 
 
+def test_where_rounding_hides_what_resists_a_few_failures_come_before_the_end():
+    path = Stubborn(0.0, hidden=True)
+    with pytest.raises(LoadStepsFailed) as failure:
+        stepper(path).advance(LoadControl(0.1))
+    assert failure.value.hidden and len(failure.value.tried) == LoadSteps().failures_hidden
+
+
 def test_shifts_where_loads_resist_are_the_smallest_first_away_from_the_start_and_stay_so_after_failures():
     path, largest = Stubborn(0.0), LoadSteps().minimum_shift
     shifts = LoadSteps().least_shifts(largest, loads_resist=True)
@@ -138,6 +153,23 @@ def test_a_path_on_which_only_steps_of_one_length_succeed_is_walked_to_its_end(p
     assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
     # steps double after each success, and halve: at most every other one fails
     assert path.failed <= 0.5 * len(path.tried) + math.log2(1.0 / part)
+
+
+class ShortOnce(Stubborn):
+    """Steps of any length succeed after the first one."""
+
+    def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
+        point = super().solve(start, control)
+        self.longest = math.inf if self.reached else self.longest
+        return point
+
+
+def test_steps_grow_where_all_of_them_take_as_many_iterations():
+    part = 1.0 / 512.0
+    path = ShortOnce(0.1 * part, iterations=2 * LoadSteps().iterations)
+    assert stepper(path).advance(LoadControl(0.1)).state.force == 0.1
+    # as many of each length, 1 + 2 + 4 + ... lengths of the first
+    assert len(path.tried) - path.failed <= LoadSteps().steady * math.log2(1.0 / part / LoadSteps().steady + 1.0) + 2
 
 
 class Inverting(Stubborn):

@@ -26,11 +26,11 @@ class OneFreedom:
 
     potentials, contact, comm, turning = (), None, MPI.COMM_SELF, None
 
-    def __init__(self) -> None:
-        self.system, self.solved, self.softest = self, 0, 1.0
+    def __init__(self, *, hidden: bool = False) -> None:
+        self.system, self.solved, self.softest, self.hidden = self, 0, 1.0, hidden
 
     def hides(self, state: State, control: LoadControl) -> bool:
-        return False
+        return self.hidden
 
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.solved += 1
@@ -82,6 +82,16 @@ def test_load_steps_after_the_first_locate_it_as_closely_and_a_load_on_the_way_b
         path.advance(LoadControl(beyond))
     assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
     assert path.advance(LoadControl(-0.5)).state.force == -0.5
+
+
+def test_it_is_located_as_closely_where_rounding_hides_what_resists():
+    path = LoadStepper(OneFreedom(hidden=True), start(), LoadControl(), predictor=HermitePredictor())
+    for load in (0.5, 0.9):
+        path.advance(LoadControl(load))
+    with pytest.raises(LoadStepsFailed) as failure:
+        path.advance(LoadControl(1.5))
+    assert failure.value.hidden and failure.value.fold == pytest.approx(1.0, abs=0.01)
+    assert 1.0 - RESOLUTION < failure.value.reached <= 1.0
 
 
 class FoundElsewhereOnce(OneFreedom):

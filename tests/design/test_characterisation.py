@@ -40,7 +40,6 @@ def experiment(displacements, thickness: float = 1.0, samples: int = 1) -> Exper
 
 
 @pytest.mark.thorough
-@pytest.mark.parallel
 def test_modulus_of_exact_data_is_found_again():
     fit = fit_modulus([experiment(exact()), experiment(exact(2.0), 2.0)], GUESS)
     assert fit.youngs_modulus == pytest.approx(1500.0, rel=1e-6)

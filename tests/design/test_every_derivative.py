@@ -102,7 +102,7 @@ def _zero(size: int) -> float | tuple[float, ...]:
         pytest.param("plane-stress", "mirrored", None, marks=pytest.mark.parallel),
         pytest.param("plane-strain", "shifted", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
         pytest.param("3d-symmetric", "same", None, marks=pytest.mark.thorough),
-        pytest.param("3d", "shifted", None, marks=(pytest.mark.thorough, pytest.mark.parallel)),
+        pytest.param("3d", "shifted", None, marks=pytest.mark.thorough),
     ],
 )
 def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulation):
@@ -145,9 +145,10 @@ def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulat
     assert not failed
 
 
-@pytest.mark.parallel
 @pytest.mark.parametrize("mass", [0.0, 2e-4])
-@pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "space", [pytest.param("plane-stress", marks=pytest.mark.parallel), pytest.param("3d", marks=pytest.mark.thorough)]
+)
 def test_equilibria_of_a_design_are_the_same_however_they_are_found(space, mass):
     """Springs strain links without any load, in configurations that displacements count from."""
     frame, size = Frame("mirrored", space, mass), 8.0 if space == "3d" else 6.0

@@ -104,9 +104,8 @@ def test_total_gradient_agrees_with_differences_of_best_positions(dim, seed):
     assert abs(partial - difference) > 1e-3 * abs(difference)  # the part of the handles is not small
 
 
-@pytest.mark.parallel
 @each_dim
-@pytest.mark.parametrize("shared", [False, True], ids=["alone", "together"])
+@pytest.mark.parametrize("shared", [False, pytest.param(True, marks=pytest.mark.parallel)], ids=["alone", "together"])
 def test_total_gradient_passes_the_taylor_test_with_handles_that_follow(dim, shared):
     both = bench(dim, shared=shared)
     comm, owned = both.mesh.mesh.comm, both.shape.owned

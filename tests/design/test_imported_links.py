@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 import fenicsmech as fm
 from fenicsmech.design import MeshQuality, ParametricShape, ShapeBounds, StayClose, rest_meshes
@@ -14,6 +13,7 @@ from fenicsmech.export import write_step
 from fenicsmech.mechanism import Centreline, Disc, Shape
 from fenicsmech.meshing import InterfaceSite, LinkOutline, boundary_polygons, find_centreline, link_outline
 
+from ..ranks import EACH_COMM
 from .mechanisms import PLASTIC, Case, objective, truss
 from .refusal import refused
 
@@ -202,8 +202,7 @@ def test_a_strip_from_a_step_file_has_the_same_optimum_as_the_strip(tmp_path):
     assert curves[1].displacements == pytest.approx(curves[0].displacements, rel=1e-3)
 
 
-@pytest.mark.parallel
-@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+@pytest.mark.parametrize("comm", EACH_COMM)
 def test_gradient_of_a_link_from_a_step_file_is_that_of_its_objective(comm):
     regulariser = MeshQuality(limit=2.5, width=2.5) + ShapeBounds() + 1e-3 * StayClose()
     whole, bench = objective(arm(CURVED), regulariser, comm=comm)

@@ -343,19 +343,6 @@ def test_gradients_by_shapes_and_shifts_agree_with_central_differences(space, si
     assert here.jacobian @ direction == pytest.approx(residuals, rel=1e-5, abs=1e-5 * np.abs(residuals).max())
 
 
-@pytest.mark.parallel
-@pytest.mark.thorough
-def test_any_number_of_processes_finds_the_same_derivatives_by_shifts():
-    seen = []
-    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
-        whole, bench = objective(shifted_truss(), StayClose(), comm=comm)
-        whole.evaluate(bench.rest.initial)
-        here = whole.evaluate(bench.design(0.05, seed=5))
-        seen.append((here.value, here.gradient))
-    for one, together in zip(*seen, strict=True):
-        assert together == pytest.approx(one, rel=1e-7, abs=1e-7 * np.abs(one).max())
-
-
 def test_invalid_places_are_refused():
     case = shifted_truss()
     sim, (diagonal,) = case.simulate(size=6.0), case.scene.mechanism.flexible_links

@@ -11,6 +11,7 @@ from fenicsmech.meshing import radius_ratios
 
 from ..elasticity.single_link import distorted, interpolate, nodes, wave
 from ..oracles.dense import taylor_rates
+from ..ranks import EACH_COMM
 
 each_dim = pytest.mark.parametrize("dim", [2, 3])
 TRIANGLE = np.array([(0.0, 0.0), (1.0, 0.0), (0.5, np.sqrt(0.75))])
@@ -49,8 +50,7 @@ def cube(rho):
     return (rho - 1.0) ** 3
 
 
-@pytest.mark.parallel
-@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+@pytest.mark.parametrize("comm", EACH_COMM)
 @pytest.mark.parametrize(("dim", "penalty"), [(2, None), (3, None), (2, cube)])
 def test_gradient_and_hessian_pass_taylor_tests(dim, penalty, comm):
     field = design_field(*distorted(dim), comm)

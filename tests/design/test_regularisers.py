@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from fenicsmech.design import (
     Barrier,
@@ -23,6 +22,7 @@ from fenicsmech.design import (
 )
 
 from ..oracles.dense import hessian, taylor_rates
+from ..ranks import EACH_COMM
 from .mechanisms import bench, pinned_links
 from .shapes import own_parameters
 
@@ -150,8 +150,7 @@ def test_regularisers_add_and_scale():
 LOW = {"plane-stress": MeshQuality(limit=2.2, width=2.2), "3d": MeshQuality(limit=3.5, width=3.5)}
 
 
-@pytest.mark.parallel
-@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+@pytest.mark.parametrize("comm", EACH_COMM)
 @pytest.mark.parametrize(("space", "size"), [("plane-stress", 2.0), ("3d", 3.0)])
 def test_mesh_quality_passes_the_taylor_test_with_handles_at_their_best(space, size, comm):
     case = pinned_links()

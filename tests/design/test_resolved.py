@@ -22,7 +22,6 @@ def errors(case: Case, simulation: fm.Simulation) -> np.ndarray:
 
 
 @pytest.mark.thorough
-@pytest.mark.parallel
 def test_targets_move_by_less_than_the_error_of_the_elements_when_iterations_continue():
     case = truss(*TARGETS)
     results, doubts = [], []

@@ -112,9 +112,8 @@ def test_tangent_and_its_transpose_pass_the_taylor_test_away_from_the_initial_de
         assert each.without.min() >= 0.95
 
 
-@pytest.mark.parallel
 @each_dim
-@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("shared", [False, pytest.param(True, marks=pytest.mark.parallel)])
 def test_the_transpose_is_that_of_the_derivative(dim, shared):
     both = bench(dim, shared=shared)
     p, theta, shape = both.design(), both.positions(), both.shape

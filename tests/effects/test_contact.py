@@ -17,6 +17,7 @@ from fenicsmech.quantities import Sensitivity
 from ..design.in_plane import design_field
 from ..design.refusal import refused
 from ..oracles.wrapped import wrap
+from ..ranks import EACH_COMM
 from .touching import block, cantilever, channel, finger, touching_beside_another, wrapped, wrapped_tip, wrapping_force
 
 PULLS = [0.05, 0.1, 0.2, 0.4]
@@ -285,8 +286,7 @@ def test_without_contact_no_boundary_is_looked_for():
 
 
 @pytest.mark.thorough
-@pytest.mark.parallel
-@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+@pytest.mark.parametrize("comm", EACH_COMM)
 @pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
 def test_displacements_in_contact_are_differentiated_by_the_design_field(space, comm):
     case = finger(space, comm=comm)

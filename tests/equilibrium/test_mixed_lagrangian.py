@@ -7,14 +7,11 @@ from mpi4py import MPI
 import fenicsmech as fm
 from fenicsmech.equilibrium import REGULARISATION, DisplacementControl
 
+from ..ranks import EACH_COMM
 from .crowded import control_of, crowded, random_state, system_of
 from .test_lagrangian import shifted
 
 BULKY = fm.Material("bulky", 2.0, 0.499)
-
-pytestmark = pytest.mark.parallel
-
-COMMS = {"alone": MPI.COMM_SELF, "together": MPI.COMM_WORLD}
 
 
 def case_of(dim: int, comm: MPI.Comm):
@@ -42,7 +39,7 @@ def extrapolated(value) -> np.ndarray:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("comm", COMMS.values(), ids=COMMS)
+@pytest.mark.parametrize("comm", EACH_COMM)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_residual_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
     system, state, control = case_of(dim, comm)
@@ -72,6 +69,7 @@ def test_residual_and_kkt_matrix_are_derivatives_of_the_lagrangian(dim, comm):
     assert curvature == pytest.approx(extrapolated(gradient_at) - proximal, rel=1e-8)
 
 
+@pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.thorough)])
 def test_shift_leaves_pressures_alone(dim):
     system, state, control = case_of(dim, MPI.COMM_WORLD)
@@ -85,10 +83,11 @@ def test_shift_leaves_pressures_alone(dim):
     assert not np.any(change.pressures)
 
 
+@pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, pytest.param(3, marks=pytest.mark.thorough)])
 def test_residual_is_the_same_on_any_number_of_ranks(dim):
     values = []
-    for comm in COMMS.values():
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         system, state, control = case_of(dim, comm)
         system.load(state)
         residual = system.residual(state, control)
@@ -96,6 +95,7 @@ def test_residual_is_the_same_on_any_number_of_ranks(dim):
     assert values[1] == pytest.approx(values[0], rel=1e-11)
 
 
+@pytest.mark.parallel
 def test_pressures_are_about_as_large_as_displacements_in_scaled_units():
     system, state, control = case_of(2, MPI.COMM_WORLD)
     system.load(state)

