@@ -48,15 +48,14 @@ DESIGN_HEADERS = (
 )  # fmt: skip
 
 
-def designs(space, size=None):
-    """Lines of the table of the claw's designs; ``size`` of elements, by default that of the demo."""
+def designs(space):
+    """Lines of the table of the claw's designs."""
     case = mechanism("claw")
-    size = size or case.size
     stress, sample = fm.LargestStress(), case.targets[-1].sample
 
     def line(name, limit):
         limits = [] if limit is None else [fm.Target(stress, sample, at_most=limit)]
-        simulation = fm.Simulation(case.scene, space=space, size=size, comm=MPI.COMM_SELF)
+        simulation = fm.Simulation(case.scene, space=space, size=case.size, comm=MPI.COMM_SELF)
         problem = fm.DesignProblem(simulation, case.designs, targets=[*case.targets, *limits])
         start = time.process_time()
         result = problem.optimise()
@@ -71,7 +70,7 @@ def designs(space, size=None):
         return result, (name, shown, result.iterations, result.evaluations, seconds, off, *over)
 
     free, first = line("without a limit", None)
-    simulation = fm.Simulation(case.scene, space=space, size=size, comm=MPI.COMM_SELF).with_design(free)
+    simulation = fm.Simulation(case.scene, space=space, size=case.size, comm=MPI.COMM_SELF).with_design(free)
     peak = simulation.load_displacement(case.force, forces=case.loads).frames[-1].peak
     return [first, line("a third below its peak", round(peak.value / 1.5, 1))[1]]
 
