@@ -93,7 +93,7 @@ class LoadSteps:
             links can move without deforming.
         failures_falling: likewise where links first move as rigid bodies to where something resists.
         failures_hidden: to one value, in a row or not, after which stepping fails where the rounding of stiff links
-            hides what resists.
+            hides what resists; not where the path is seen to turn back, whose load is found as closely as others.
         failures_inverted: steps in a row without equilibrium, of which the last one's prediction inverts elements,
             after which steps to the value begin at the last equilibrium.
         smallest_limited: smallest step that ``motion`` may impose, over the distance to the end; smaller ones arise
