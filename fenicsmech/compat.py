@@ -20,6 +20,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import cache
+from itertools import count
 from pathlib import Path
 
 import basix
@@ -198,12 +199,9 @@ def quadrature_space(mesh: dmesh.Mesh, degree: int, size: int) -> fem.FunctionSp
 
 
 def lagrange_element(dim: int, nodes: int):
-    """Basix's element of the scalar Lagrange fields with as many ``nodes`` in a cell."""
-    cell, degree = {
-        (2, 3): ("triangle", 1), (2, 6): ("triangle", 2), (2, 10): ("triangle", 3),
-        (3, 4): ("tetrahedron", 1), (3, 10): ("tetrahedron", 2), (3, 20): ("tetrahedron", 3),
-    }[dim, nodes]  # fmt: skip
-    kind = getattr(basix.CellType, cell)
+    """Basix's element of the scalar Lagrange fields with as many ``nodes`` in a cell, C(degree + dim, dim)."""
+    kind = {2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}[dim]
+    degree = next(degree for degree in count(1) if math.comb(degree + dim, dim) >= nodes)
     return basix.create_element(basix.ElementFamily.P, kind, degree, basix.LagrangeVariant.gll_warped)
 
 
