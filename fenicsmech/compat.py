@@ -20,7 +20,6 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import cache
-from itertools import count
 from pathlib import Path
 
 import basix
@@ -201,7 +200,7 @@ def quadrature_space(mesh: dmesh.Mesh, degree: int, size: int) -> fem.FunctionSp
 def lagrange_element(dim: int, nodes: int):
     """Basix's element of the scalar Lagrange fields with as many ``nodes`` in a cell, C(degree + dim, dim)."""
     kind = {2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}[dim]
-    degree = next(degree for degree in count(1) if math.comb(degree + dim, dim) >= nodes)
+    degree = {math.comb(degree + dim, dim): degree for degree in range(1, 5)}[nodes]
     return basix.create_element(basix.ElementFamily.P, kind, degree, basix.LagrangeVariant.gll_warped)
 
 
