@@ -60,6 +60,7 @@ a dead load the equilibria past a limit point are not those that the mechanism w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -345,9 +346,17 @@ class LoadStepper(Stepper):
                 way.aside[value] = point
 
     def _value_ahead(self, way: _Way) -> float:
-        """The value a step ahead, the prescribed one if that is no farther."""
+        """The value a step ahead, the prescribed one if that is no farther.
+
+        Once a value has failed, steps to beyond a fold that is seen end at three quarters of the way there: half of
+        the motion is left. The last one, as small as any, ends beyond.
+        """
         remaining = way.control.prescribed - self._value
         step = self._limited(way.step, way.distance)
+        fold = self._fold(self._value + step) if way.tried and way.beyond is None else None
+        if fold is not None and abs(fold - self._value) < abs(step):
+            least = 1.5 * self._steps.smallest * self._scale(way.distance)
+            step = math.copysign(min(abs(step), max(0.75 * abs(fold - self._value), least)), step)
         return way.control.prescribed if abs(step) >= abs(remaining) * (1.0 - 1e-9) else self._value + step
 
     def _tried(self, way: _Way, control: Control) -> EquilibriumPoint:

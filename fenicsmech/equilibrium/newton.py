@@ -84,6 +84,8 @@ class PrimalDualNewton(EquilibriumMethod):
         halvings: of a step along which the line search looks for descent.
         halvings_inverted: of a whole step that inverts elements.
         watchdog: iterations in a row that may fail to improve on the best residual.
+        creeping: iterations in a row that may raise δ where the residual is rounding: then the best state is the
+            equilibrium, if nothing moves there.
         predicted_stress: whether K_uu, as long as the residual is large, holds the stress that the last step solved
             for instead of the one it led to.
         largest_turn: largest rotation (rad), or displacement over the mechanism's length, of one step.
@@ -108,6 +110,7 @@ class PrimalDualNewton(EquilibriumMethod):
     halvings: int = 20
     halvings_inverted: int = 12
     watchdog: int = 12
+    creeping: int = 3
     predicted_stress: bool = True
     largest_turn: float = 0.5
     reuse_factor: float = 1e-3
@@ -126,6 +129,7 @@ class PrimalDualNewton(EquilibriumMethod):
             halvings=1,
             halvings_inverted=1,
             watchdog=0,
+            creeping=1,
             path_iterations=1,
             turns=1,
         )
@@ -164,7 +168,7 @@ class NewtonSolver(EquilibriumSolver):
         system, options, path = self.system, self.options, control.along_path
         limit, least = options.path_iterations if path else options.iterations, start.minimum_shift
         state, residual = start, self.residual(start, control)
-        best, not_better, line_search = (state, residual), 0, False
+        best, not_better, creeping, line_search = (state, residual), 0, 0, False
         diverged, raising = None, math.inf  # before the first step of any stability that raised the residual; length of
         # the last such step
         last: _Began = None
@@ -191,6 +195,12 @@ class NewtonSolver(EquilibriumSolver):
                 return point
             if iteration == limit or self.factorisations >= most:
                 break
+            creeping = creeping + 1 if shift > least and residual.norm <= self.rounding(residual) else 0
+            if creeping == options.creeping:  # along a mode whose stability rounding does not tell
+                try:
+                    return self.accept_best(*best, control, residuals, NotConverged("", iteration))
+                except NotConverged:
+                    residual = self._again(state, control)
             near = path or (any_stability and (diverged is not None or residuals[-1] < options.near))
             predicted = last is not None and not near
             self.assemble(state, control, residual, last if predicted else None, contact)

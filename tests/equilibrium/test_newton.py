@@ -1,5 +1,6 @@
 """Newton's iteration converges at its order, and says what went wrong when it does not converge."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -140,6 +141,28 @@ def test_failure_names_a_link_softer_than_the_rounding_of_the_one_it_carries_as_
     simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", order=1, size=2.0, comm=MPI.COMM_SELF)
     with pytest.raises(fm.EquilibriumError, match="less than the rounding of the stiffest links: make 'anvil' rigid"):
         simulation.load_displacement(push, forces=[1e-14])
+
+
+def test_an_unstable_equilibrium_known_to_rounding_only_is_found_in_a_few_iterations():
+    angle, stiffness, length = 1.0, 1e-3, 56.0
+    mechanism = fm.Mechanism("column on a soft hinge")
+    base, crank = mechanism.rigid("base", fixed=True), mechanism.rigid("crank")
+    shape = fm.strip([(20, 0), (80, 0)], thickness=8.0, depth=8.0)
+    column = mechanism.flexible("column", shape, fm.Material("steel", 2e5, 0.3))
+    drive = mechanism.motor(mechanism.revolute(base, crank, at=(0, 0)))
+    hinge = mechanism.revolute(crank, column, at=(20, 0), interface_radius=2.0)
+    along = (-math.cos(angle), -math.sin(angle))
+    push = mechanism.force(on=column, at=(20 + length, 0), direction=along, region=fm.Disc(2.0))
+    scene = fm.Scene(mechanism, effects=[fm.JointSpring(hinge, stiffness)])
+    solver = fm.PrimalDualNewton(near=1e-4)  # of which rounding is the multiple
+    simulation = fm.Simulation(scene, space="plane-stress", size=8.0, solver=solver, comm=MPI.COMM_SELF)
+    turned, buckling = scene.configuration("turned", {drive: angle}), stiffness / length
+    (below, above) = simulation.load_displacement(
+        push, forces=[0.5 * buckling, 2.0 * buckling], configuration=turned
+    ).frames
+    assert below.stable and not above.stable
+    assert abs(above.displacement) < 1e-8 and above.residuals[-1] > 1e-4
+    assert above.iterations <= 6
 
 
 @pytest.mark.parametrize(("before", "steady"), [(1.0, True), (5.0, False), (0.2, False)])
