@@ -225,8 +225,11 @@ class CurveFollower:
                 state = self._stepper.start(LoadControl(self._sense(rest))).state
                 if free := self._within(self._conjugate(state), rest):
                     return self._moved_freely(free, rest, watch)
-                self._frames.append(self._first_loaded(state, rest))
-                state = self._frames[-1].state
+                loaded = self._first_loaded(state, rest)
+                state = loaded.state
+                if free := self._within(self._conjugate(state), rest):
+                    return self._moved_freely(free, rest, watch)
+                self._frames.append(loaded)
             path = self._path(state)
         except NotConverged as failure:
             raise self._ended(failure) from failure

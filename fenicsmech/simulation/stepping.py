@@ -207,7 +207,7 @@ class CurveStepper:
         """Whether links move as rigid bodies before anything resists the first force, which prefers no pose."""
         if not self.adrift or control.constrained or not control.prescribed or start.rest.loads_resist:
             return False
-        return not start.steps.iterations and not any(frame.force for frame in self.frames)
+        return not any(frame.force for frame in self.frames)
 
     def _fallen(self, start: CurveStart, control: Control) -> EquilibriumPoint:
         """The equilibrium of load steps, or that which links reach as rigid bodies once a few of them have failed."""

@@ -422,3 +422,20 @@ def test_path_of_a_rod_that_meets_a_wall_on_its_way_starts_there(end):
     assert followed.displacements[1] == pytest.approx(LENGTH * math.sin(touching), rel=5e-3)
     assert (followed.forces[-1] == pytest.approx(1e-2)) if end.force else (followed.displacements[-1] > 19.149)
     assert followed.stable.all() and followed.events == ()
+
+
+def test_path_to_a_place_before_the_wall_that_the_rod_meets_needs_no_force():
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
+    followed = simulation.follow(pull, until=fm.Until(displacement=5.0))
+    assert followed.displacements == pytest.approx([0.0, 5.0], abs=1e-9)
+    assert followed.forces == pytest.approx(0.0, abs=1e-12)
+    assert followed.events == ()
+
+
+def test_rod_falls_to_a_wall_as_a_rigid_body_after_a_frame_without_a_force_as_well():
+    simulation, pull = pendulum((1, 0), lambda rod: fm.Contact(rod, fm.HalfPlane((20, 0), (-1, 0))))
+    (alone,) = simulation.load_displacement(pull, forces=[1e-2]).frames
+    rest, after = simulation.load_displacement(pull, forces=[0.0, 1e-2]).frames
+    assert rest.displacement == pytest.approx(0.0, abs=1e-9)
+    assert after.displacement == pytest.approx(alone.displacement, rel=1e-8)
+    assert rest.iterations + after.iterations <= alone.iterations + 2
