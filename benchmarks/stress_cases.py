@@ -61,12 +61,12 @@ class Case:
     reference: Callable[[str, float], Reference]
     strain: Callable[[float], float] = lambda stress: stress / E
 
-    def solved(self, space: str, size: float) -> tuple[fm.Curve, Reference]:
-        """The curve with elements of ``size``, and the reference of the peak at its end."""
+    def solved(self, space: str, size: float) -> tuple[fm.Frame, Reference]:
+        """The frame with elements of ``size``, and the reference of its peak."""
         mechanism, effects, part, force = self.build(space)
         simulation = fm.Simulation(fm.Scene(mechanism, effects), space=space, size=size, comm=MPI.COMM_SELF)
-        curve = simulation.load_displacement(part, forces=[force])
-        return curve, self.reference(space, max(place.reach for place in simulation.singular_places))
+        frame = simulation.load_displacement(part, forces=[force]).frames[-1]
+        return frame, self.reference(space, max(place.reach for place in simulation.singular_places))
 
 
 def between(name, shape, *ends):
