@@ -1,14 +1,14 @@
 """Load steps (natural continuation): from a known equilibrium to the wanted value of a control.
 
-An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails and double
-when it took few iterations; the tangent bounds their motion; equilibria reached are kept, and the way to another value
-begins at the nearest of those that were asked for. Stepping fails once steps are small relative to the distance
-covered, however far the prescribed value: the softest stiffness falls as √(1 − p / p*) towards a limit load p*, and the
-last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5 % of it. A step that moves a coordinate outside the
-range of the tangents at its ends may have snapped over a fold, where the path turns back: it is halved too, and if that
-does not help the snap is accepted and counted. Where other points touch obstacles the tangent changes at once: steps
-then take up the whole distance again, unless they had to be halved, and equilibria beyond what looked like a snap, but
-may be such a kink, are kept until steps come near.
+An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails, go most of
+the way to a fold once it is seen ahead, and double when it took few iterations; the tangent bounds their motion;
+equilibria reached are kept, and the way to another value begins at the nearest of those that were asked for. Stepping
+fails once steps are small relative to the distance covered, however far the prescribed value: the softest stiffness
+falls as √(1 − p / p*) towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5
+% of it. A step that moves a coordinate outside the range of the tangents at its ends may have snapped over a fold,
+where the path turns back: it is halved too, and if that does not help the snap is accepted and counted. Where other
+points touch obstacles the tangent changes at once: steps then take up the whole distance again, unless they had to be
+halved, and equilibria beyond what looked like a snap, but may be such a kink, are kept until steps come near.
 
 Where an equilibrium is not found at once, fallbacks follow in this order. All of them are bounded by counts, which are
 the same on all processes and machines, and not by time:
