@@ -28,8 +28,8 @@ the same on all processes and machines, and not by time:
                                                                equilibrium past a fold is known, or ``failures`` in
                                                                a row
     8. the nearest equilibrium found past a fold, a snap; or   one; or one solve ``snap_iterations`` times as long
-       where no fold is seen, that of a longer solve; or the
-       nearest of those kept under contact
+       that of a longer solve; or the nearest of those kept
+       under contact
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre (``dead_centre``)                  not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -479,7 +479,7 @@ class LoadStepper(Stepper):
     def _beyond_steps(
         self, control: Control, failure: NotConverged, tried: Sequence[float], hidden: bool, *, longer: bool
     ) -> EquilibriumPoint:
-        """The equilibrium that more iterations lead to from the last one, where steps end and no fold is seen.
+        """The equilibrium that more iterations lead to from the last one, where steps end.
 
         Args:
             control: at the value of the last step that failed.
@@ -490,9 +490,10 @@ class LoadStepper(Stepper):
             LoadStepsFailed: there is none.
         """
         fold = self._fold(control.prescribed)
-        if longer and not hidden and fold is None and self._last is not None:
+        if longer and not hidden and self._last is not None:
+            descending = self.solver if fold is None else self.solver.turning or self.solver  # turns lead far
             try:
-                point = self.solver.patient(self._steps.snap_iterations).solve(self._last.state, control)
+                point = descending.patient(self._steps.snap_iterations).solve(self._last.state, control)
             except NotConverged as ended:
                 self.iterations += ended.iterations
             else:

@@ -80,6 +80,26 @@ class LinkMesh:
         """The cells (k, dim + 1) that the interface ``site`` holds; ``FREE`` gives the flexible ones."""
         return self.cells[self.interface == site]
 
+    def quartered(self) -> LinkMesh:
+        """Triangles, each cut in four at the middles of its edges, with the same outline.
+
+        At a quarter of its way a curved edge bulges by ¾ w, half of w above the new chord: new edges bulge by ¼ w.
+        """
+        points, cells, count = self.points, self.cells, len(self.points)
+        edges = _edges(cells)[:, ::-1]  # the k-th one lies opposite corner k
+        unique, numbers = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+        a, b, c = numbers.reshape(-1, 3).T + count
+        parts = [(cells[:, 0], c, b), (cells[:, 1], a, c), (cells[:, 2], b, a), (a, b, c)]
+        middles, rows = points[unique].mean(axis=1), edge_rows(unique, self.curved.ends)
+        middles[rows] += self.curved.bulges
+        ends = np.vstack([np.column_stack([end, rows + count]) for end in self.curved.ends.T])
+        return LinkMesh.from_cells(
+            np.vstack([points, middles]),
+            np.vstack([np.column_stack(part) for part in parts]),
+            np.tile(self.interface, 4),
+            CurvedEdges(ends, np.tile(0.25 * self.curved.bulges, (2, 1))),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class CurvedEdges:
@@ -424,6 +444,12 @@ class MechanismMesh:
         """The same mesh, distributed over ``comm``."""
         whole = self.vertices, self.cells, self.link_of_cell, self.interface_of_cell, self.curved
         return _distributed(comm, *whole)
+
+    def quartered(self) -> MechanismMesh:
+        """Its triangles, each cut in four, see ``LinkMesh.quartered``, distributed over the same processes."""
+        whole = LinkMesh(self.vertices, self.cells, self.interface_of_cell, self.curved).quartered()
+        link = np.tile(self.link_of_cell, 4)
+        return _distributed(self.comm, whole.points, whole.cells, link, whole.interface, whole.curved)
 
     def corners(self, cells: np.ndarray) -> np.ndarray:
         """Corner coordinates of local ``cells``, (cells, dim + 1, dim)."""

@@ -152,9 +152,9 @@ class Curve(FrameSeries):
     ) -> CheckedErrors:
         """Errors as ``error_estimates`` or ``modelling_errors``, each from an equilibrium elsewhere.
 
-        The equilibrium of a frame is sought again, from its own as the guess: in elements of the next order on the
-        same mesh, in the plane of the order after that where needed. How the value changes, and estimates there, make
-        up the error; that of plane stress is what such elements in space change (``simulation.recomputed``). Much of
+        The equilibrium of a frame is sought again, from its own as the guess: in elements of the next order, in the
+        plane half as wide too. How the value changes, and estimates there, make up the error; that of plane stress is
+        what elements of the next order in space change (``simulation.recomputed``). Much of
         what is said against estimates (``doubts``) holds no more then. What the other elements need is compiled and
         kept for further calls.
 

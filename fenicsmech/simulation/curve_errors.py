@@ -7,7 +7,7 @@ prescribed one counts from.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -40,7 +40,6 @@ from fenicsmech.simulation.recomputed import Recomputed
 _log = logger(__name__)
 _AT_POINT = "force at a point of a flexible link"
 _ESTIMATED = "most of the error is an estimate"
-_HIGHEST = 4  # order of finer elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,14 +55,6 @@ class CheckedErrors:
     errors: np.ndarray
     checked: np.ndarray
     doubts: tuple[tuple[str, ...], ...]
-
-    def but(self, at: Sequence[int], others: CheckedErrors) -> CheckedErrors:
-        """These, but for the frames with the numbers ``at``, for which ``others`` hold where an equilibrium is near."""
-        errors, doubts = self.errors.copy(), list(self.doubts)
-        for k, error, checked, own in zip(at, others.errors, others.checked, others.doubts, strict=True):
-            if checked:
-                errors[k], doubts[k] = error, own
-        return replace(self, errors=errors, doubts=tuple(doubts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +149,6 @@ class CurveErrors:
     def checked(self, kind: ErrorKind, options: DoubtOptions) -> CheckedErrors:
         """Errors of a kind from equilibria elsewhere: in finer elements, or in space; estimates where there is none.
 
-        Where most of an error of elements in the plane is still an estimate, values in three orders say more.
-
         Raises a DescriptionError where the error is that of plane stress and the curve is in another model.
         """
         own, finer = self._curve.values, self._curve.discretisation.finer
@@ -167,20 +156,10 @@ class CurveErrors:
             check_plane_stress(finer.fidelity.model)
             there, space = (self._elsewhere(other, options) for other in (finer, finer.in_space))
             return self._found(kind, space.values - there.values, space.rest - there.rest, (there, space), options)
-        there = self._elsewhere(finer, options)
-        (before,), first = self.estimated([kind]), there.values - own
-        left = _left(first, before, there.rest)
-        found = self._found(kind, first + left, left, (there,), options)
-        again = [k for k, doubts in enumerate(found.doubts) if _ESTIMATED in doubts]
-        if not again or finer.fidelity.order == _HIGHEST or finer.fidelity.model.dim == 3:
-            return found
-        some = CurveErrors(replace(self._curve, frames=tuple(self._curve.frames[k] for k in again)))
-        further = some._elsewhere(finer.finer, options)
-        # Aitken's Δ²:  Q − Q₂ ≈ d₂² / (d₁ − d₂) after differences d₁ = Q₁ − Q₀, d₂ = Q₂ − Q₁
-        first, second = first[again], further.values - there.values[again]
-        falls = np.abs(second) < np.abs(first)
-        left = np.divide(second**2, first - second, out=np.full(len(again), np.nan), where=falls)
-        return found.but(again, some._found(kind, first + second + left, left, (further,), options))
+        there = self._elsewhere(finer if finer.fidelity.model.dim == 3 else finer.halved, options)
+        (before,), fall = self.estimated([kind]), there.values - own
+        left = _left(fall, before, there.rest)
+        return self._found(kind, fall + left, left, (there,), options)
 
     def _found(
         self,
@@ -198,7 +177,7 @@ class CurveErrors:
         least = options.left * np.abs(errors)
         said = {
             _ESTIMATED: np.abs(left) > least,
-            _AT_POINT: elsewhere[-1].growth > least,  # the next order sees one halving, about
+            _AT_POINT: elsewhere[-1].growth > least,
             ROUNDED: self.imbalance + sum(own.imbalance for own in elsewhere) > least,
         }
         failures = [tuple(own.failures[k] for own in elsewhere if k in own.failures) for k in range(count)]

@@ -1,18 +1,16 @@
 """Frames of a curve in another discretisation of its scene, with the equilibria of the curve as guesses.
 
-In elements of the next order on the same mesh, with the estimate η of the error there, the error of a value Q is
+In elements of the next order, in the plane half as wide too, with the estimate η of the error there, the error of a
+value Q is
 
-    Q(u) − Q(u_k) ≈ Q(u_(k+1)) − Q(u_k) + min(1, θ) η(u_(k+1)),     θ = (Q(u_(k+1)) − Q(u_k)) / (η(u_k) − η(u_(k+1))),
+    Q(u) − Q(u_k) ≈ Q(u_f) − Q(u_k) + min(1, θ) η(u_f),     θ = (Q(u_f) − Q(u_k)) / (η(u_k) − η(u_f)),
 
 to all orders in the error of the displacement but for what is left of it, within a factor of two where η is, which is
 less than half of it. θ is the part of the fall that estimates state which values show; it counts where it is positive.
-Where more is left, as η overstates it beside corners, values in elements of order k + 2 extrapolate (Aitken), in the
-plane. What space adds to plane stress is the difference of values in space and in plane stress, both in elements of
-order k + 1 (3 at most in space): what elements leave of both is nearly the same, and its estimates are not. Edges of
-designs of order 1 stay straight.
-
-Source: Aitken, "On Bernoulli's numerical solution of algebraic equations" (Proceedings of the Royal Society of
-Edinburgh 46, 1926).
+Estimates alone miss corners, and where links begin to touch: the next order leaves much of those, smaller elements
+less. What space adds to plane stress is the difference of values in space and in plane stress, both in elements of the
+next order (3 at most in space) on the same triangles: what elements leave of both is nearly the same, and its estimates
+are not. Edges of designs of order 1 stay straight.
 """
 
 from __future__ import annotations

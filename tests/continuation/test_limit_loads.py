@@ -32,6 +32,9 @@ class OneFreedom:
     def hides(self, state: State, control: LoadControl) -> bool:
         return self.hidden
 
+    def patient(self, factor: int) -> OneFreedom:
+        return self
+
     def solve(self, start: State, control: LoadControl) -> EquilibriumPoint:
         self.solved += 1
         if control.prescribed > 1.0:

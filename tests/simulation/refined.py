@@ -2,29 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 import fenicsmech as fm
 from fenicsmech import model
-from fenicsmech.meshing import CurvedEdges, LinkMesh
-
-
-def quartered(mesh: LinkMesh) -> LinkMesh:
-    """The triangles of a link, each cut in four at the midpoints of its edges, its outline as before."""
-    points, cells = mesh.points, mesh.cells
-    edges = np.sort(np.vstack([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]]), axis=1)
-    unique, inverse = np.unique(edges, axis=0, return_inverse=True)
-    a, b, c = np.split(inverse.ravel() + len(points), 3)
-    parts = [(cells[:, 0], c, b), (cells[:, 1], a, c), (cells[:, 2], b, a), (a, b, c)]
-    finer = np.vstack([np.column_stack(part) for part in parts])
-    middles = points[unique].mean(axis=1)
-    count = len(points)
-    rows = np.searchsorted(unique @ (count, 1), mesh.curved.ends @ (count, 1))
-    middles[rows] += mesh.curved.bulges
-    # at a quarter of its way the curve bulges three quarters as much as in the middle, half a bulge above the chord
-    ends = np.vstack([np.column_stack([end, rows + count]) for end in mesh.curved.ends.T])
-    curved = CurvedEdges(ends, np.tile(0.25 * mesh.curved.bulges, (2, 1)))
-    return LinkMesh.from_cells(np.vstack([points, middles]), finer, np.tile(mesh.interface, 4), curved)
 
 
 def refine(monkeypatch, levels: int) -> None:
@@ -34,7 +13,7 @@ def refine(monkeypatch, levels: int) -> None:
     def mesh_links(*arguments):
         meshes = plain(*arguments)
         for _ in range(levels):
-            meshes = [quartered(mesh) for mesh in meshes]
+            meshes = [mesh.quartered() for mesh in meshes]
         return meshes
 
     monkeypatch.setattr(model, "mesh_links", mesh_links)

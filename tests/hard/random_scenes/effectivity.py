@@ -4,7 +4,7 @@ The effectivity of an estimate is the estimate over the true difference. That of
 elements a quarter as wide of the same outline, in space half as wide in all directions, and of order 2 at least; that
 of plane stress the difference between both models in such elements, each with its own estimate added.
 Where it is not within a factor of two, the scene must say so: by a doubt of the estimate (``Curve.doubts``), or because
-the difference is below resolution. Judged are estimates alone, and those from elements of the next order
+the difference is below resolution. Judged are estimates alone, and those from finer elements
 (``Curve.checked_errors``). Elements are 0.9 to 1.5 times as wide as their link is thick; designs are those of
 exported parts.
 
@@ -91,7 +91,7 @@ class Judged:
         value: the displacement or force.
         elements: the error of its elements.
         plane_stress: of plane stress; None in other models.
-        checked_elements: the first one from elements of the next order.
+        checked_elements: the first one from finer elements.
         checked_plane_stress: the second one from these.
         left_out: why nothing is compared, empty if something is.
         seconds: wall-clock time.
@@ -123,7 +123,7 @@ class Judged:
 
     @property
     def checked(self) -> list[Estimate]:
-        """Those from elements of the next order."""
+        """Those from finer elements."""
         return [estimate for kind, estimate in self.kinds.items() if kind.endswith(_CHECKED)]
 
     @classmethod

@@ -19,7 +19,6 @@ from fenicsmech.design import Infeasible, SampleEquilibria
 from fenicsmech.meshing import LinkMesh, cutting
 from fenicsmech.simulation import whole_state
 
-from ...simulation.refined import quartered
 from .blueprint import Blueprint, Built, build
 from .draw import length
 from .thresholds import THRESHOLDS
@@ -103,7 +102,7 @@ def refined(levels: int) -> Iterator[None]:
 
     def cut(mesh: LinkMesh) -> LinkMesh:
         for _ in range(levels):
-            mesh = quartered(mesh)
+            mesh = mesh.quartered()
         return mesh
 
     def flat(*arguments) -> list[LinkMesh]:
