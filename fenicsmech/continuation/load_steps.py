@@ -112,6 +112,7 @@ class LoadSteps:
             equilibrium beyond one is known.
         fold_growth: growth of the tangent over the last step from which the path counts as turning back.
         fold_ahead: largest distance ahead at which it does, over the last step that failed.
+        approach: part of the way to a fold that a step goes at most: three quarters leave half of the motion.
         minimum_shift: least shift of the KKT matrix, in units of links' stiffness, where a mechanism has zero-energy
             modes, which would leave it singular.
         shift_factors: of ``minimum_shift``, tried in order: a shift slows Newton's method down where soft springs or
@@ -142,6 +143,7 @@ class LoadSteps:
     smallest_snap_step: float = 1.0 / 64.0
     fold_growth: float = 1.1
     fold_ahead: float = 4.0
+    approach: float = 0.75
     minimum_shift: float = 1e-10
     shift_factors: tuple[float, ...] = (1.0, 1e-3, 0.0)
     arc_steps: int = 300
@@ -348,15 +350,16 @@ class LoadStepper(Stepper):
     def _value_ahead(self, way: _Way) -> float:
         """The value a step ahead, the prescribed one if that is no farther.
 
-        Once a value has failed, steps to beyond a fold that is seen end at three quarters of the way there: half of
-        the motion is left. The last one, as small as any, ends beyond.
+        Once a value has failed, steps go a part of the way to a fold that is seen. The last one, as small as any, ends
+        beyond.
         """
         remaining = way.control.prescribed - self._value
         step = self._limited(way.step, way.distance)
         fold = self._fold(self._value + step) if way.tried and way.beyond is None else None
         if fold is not None and abs(fold - self._value) < abs(step):
-            least = 1.5 * self._steps.smallest * self._scale(way.distance)
-            step = math.copysign(min(abs(step), max(0.75 * abs(fold - self._value), least)), step)
+            least = 1.5 * self._steps.smallest * self._scale(way.distance)  # half of it is none any more
+            ahead = max(self._steps.approach * abs(fold - self._value), least)
+            step = math.copysign(min(abs(step), ahead), step)
         return way.control.prescribed if abs(step) >= abs(remaining) * (1.0 - 1e-9) else self._value + step
 
     def _tried(self, way: _Way, control: Control) -> EquilibriumPoint:

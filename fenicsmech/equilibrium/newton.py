@@ -197,10 +197,9 @@ class NewtonSolver(EquilibriumSolver):
                 break
             creeping = creeping + 1 if shift > least and residual.norm <= self.rounding(residual) else 0
             if creeping == options.creeping:  # along a mode whose stability rounding does not tell
-                try:
-                    return self.accept_best(*best, control, residuals, NotConverged("", iteration))
-                except NotConverged:
-                    residual = self._again(state, control)
+                if (rounded := self._rounded(*best, control, residuals, iteration)) is not None:
+                    return rounded
+                residual = self._again(state, control)
             near = path or (any_stability and (diverged is not None or residuals[-1] < options.near))
             predicted = last is not None and not near
             self.assemble(state, control, residual, last if predicted else None, contact)
@@ -231,10 +230,8 @@ class NewtonSolver(EquilibriumSolver):
                     diverged, raising = diverged or before, moved
                 else:
                     if best[1].norm <= self.rounding(best[1]):  # the step strained stiff links that it turned
-                        try:
-                            return self.accept_best(*best, control, residuals, NotConverged("", iteration + 1))
-                        except NotConverged:
-                            system.load(state)
+                        if (rounded := self._rounded(*best, control, residuals, iteration + 1)) is not None:
+                            return rounded
                     # no contraction: near a limit or bifurcation point, where only descent makes progress
                     state, any_stability, line_search, last = diverged or before, False, True, None
                     # no step led to this residual: as large as before does not mean that it no longer falls
@@ -249,6 +246,15 @@ class NewtonSolver(EquilibriumSolver):
                 state, line_search, last = best[0], True, None
                 residual, norm = self._again(state, control), math.inf
         return self.accept_best(*best, control, residuals, self.exhausted(residuals, iteration))
+
+    def _rounded(
+        self, best: State, residual: Residual, control: Control, residuals: list[float], iterations: int
+    ) -> EquilibriumPoint | None:
+        """The ``best`` state before the iterations end, if its residual is rounding (``accept_best``); else None."""
+        try:
+            return self.accept_best(best, residual, control, residuals, NotConverged("", iterations))
+        except NotConverged:
+            return None
 
     def _without_factor(
         self, start: State, control: Control, residual: Residual

@@ -154,9 +154,8 @@ class Curve(FrameSeries):
 
         The equilibrium of a frame is sought again, from its own as the guess: in elements of the next order, in the
         plane half as wide too. How the value changes, and estimates there, make up the error; that of plane stress is
-        what elements of the next order in space change (``simulation.recomputed``). Much of
-        what is said against estimates (``doubts``) holds no more then. What the other elements need is compiled and
-        kept for further calls.
+        what elements of the next order in space change (``simulation.recomputed``). Much of what is said against
+        estimates (``doubts``) holds no more then. What the other elements need is compiled and kept for further calls.
 
         Args:
             options: when errors are in doubt.

@@ -223,13 +223,12 @@ class CurveFollower:
             state = rest.state
             if self._drifts:
                 state = self._stepper.start(LoadControl(self._sense(rest))).state
-                if free := self._within(self._conjugate(state), rest):
+                if not (free := self._within(self._conjugate(state), rest)):
+                    self._frames.append(self._first_loaded(state, rest))
+                    state = self._frames[-1].state
+                    free = self._within(self._frames[-1].displacement, rest)
+                if free:
                     return self._moved_freely(free, rest, watch)
-                loaded = self._first_loaded(state, rest)
-                state = loaded.state
-                if free := self._within(self._conjugate(state), rest):
-                    return self._moved_freely(free, rest, watch)
-                self._frames.append(loaded)
             path = self._path(state)
         except NotConverged as failure:
             raise self._ended(failure) from failure

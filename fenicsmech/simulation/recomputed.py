@@ -9,8 +9,8 @@ to all orders in the error of the displacement but for what is left of it, withi
 less than half of it. θ is the part of the fall that estimates state which values show; it counts where it is positive.
 Estimates alone miss corners, and where links begin to touch: the next order leaves much of those, smaller elements
 less. What space adds to plane stress is the difference of values in space and in plane stress, both in elements of the
-next order (3 at most in space) on the same triangles: what elements leave of both is nearly the same, and its estimates
-are not. Edges of designs of order 1 stay straight.
+next order (3 at most in space), as large: what elements leave of both is nearly the same, and its estimates are not.
+Edges of designs of order 1 stay straight.
 """
 
 from __future__ import annotations
