@@ -61,12 +61,12 @@ class Case:
     reference: Callable[[str, float], Reference]
     strain: Callable[[float], float] = lambda stress: stress / E
 
-    def solved(self, space: str, size: float) -> tuple[fm.Frame, Reference]:
-        """The frame with elements of ``size``, and the reference of its peak."""
+    def solved(self, space: str, size: float) -> tuple[fm.Curve, Reference]:
+        """The curve of one frame with elements of ``size``, and the reference of its peak."""
         mechanism, effects, part, force = self.build(space)
         simulation = fm.Simulation(fm.Scene(mechanism, effects), space=space, size=size, comm=MPI.COMM_SELF)
-        frame = simulation.load_displacement(part, forces=[force]).frames[-1]
-        return frame, self.reference(space, max(place.reach for place in simulation.singular_places))
+        curve = simulation.load_displacement(part, forces=[force])
+        return curve, self.reference(space, max(place.reach for place in simulation.singular_places))
 
 
 def between(name, shape, *ends):
@@ -309,7 +309,7 @@ def pressed(_: str):
     base = mechanism.rigid("base", fixed=True)
     link = mechanism.flexible("link", fm.step_file(solid(tube), depth=DEPTH), STEEL)
     # held at almost a point, which hardly strains it
-    mechanism.weld(base, link, at=(3.8, 0.0), region=fm.Disc(0.05))
+    mechanism.weld(base, link, at=(3.8, 0.0), region=fm.Disc(0.01))
     idle = mechanism.force(on=link, at=(-OUTER, 0.0), direction=(1, 0))
 
     def bore(x: np.ndarray) -> np.ndarray:

@@ -171,9 +171,9 @@ class Curve(FrameSeries):
         return errors.checked(_kind(modelling), options)
 
     def in_finer_elements(self, frame: Frame | None = None) -> Frame:
-        """The equilibrium near that of a frame in elements of the next order on the same mesh, with all its quantities.
+        """The equilibrium near that of a frame in elements of the next order, in the plane half as wide too.
 
-        It shows what elements leave of those that have no estimate.
+        All its quantities show what elements leave of them: peaks of stress closer than their own estimates do.
 
         Args:
             frame: one of the curve's; the last one by default.
@@ -183,7 +183,7 @@ class Curve(FrameSeries):
             EquilibriumError: no equilibrium is near.
         """
         self._need_force()
-        return Recomputed(self, self.discretisation.finer, DoubtOptions()).frame(self._chosen(frame))
+        return Recomputed(self, self.discretisation.refined, DoubtOptions()).frame(self._chosen(frame))
 
     @cached_property
     def corrections(self) -> np.ndarray:

@@ -151,12 +151,13 @@ class CurveErrors:
 
         Raises a DescriptionError where the error is that of plane stress and the curve is in another model.
         """
-        own, finer = self._curve.values, self._curve.discretisation.finer
+        own, discretisation = self._curve.values, self._curve.discretisation
         if kind is ErrorKind.PLANE_STRESS:
-            check_plane_stress(finer.fidelity.model)
+            check_plane_stress(discretisation.fidelity.model)
+            finer = discretisation.finer
             there, space = (self._elsewhere(other, options) for other in (finer, finer.in_space))
             return self._found(kind, space.values - there.values, space.rest - there.rest, (there, space), options)
-        there = self._elsewhere(finer if finer.fidelity.model.dim == 3 else finer.halved, options)
+        there = self._elsewhere(discretisation.refined, options)
         (before,), fall = self.estimated([kind]), there.values - own
         left = _left(fall, before, there.rest)
         return self._found(kind, fall + left, left, (there,), options)

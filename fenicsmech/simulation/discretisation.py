@@ -115,6 +115,11 @@ class Discretisation:
         other.mesh = self.mesh.quartered()
         return other
 
+    @property
+    def refined(self) -> Discretisation:
+        """What errors of elements are found in: ``finer``, in the plane ``halved`` too."""
+        return self.finer if self.fidelity.model.dim == 3 else self.finer.halved
+
     @cached_property
     def in_space(self) -> Discretisation:
         """The same scene in space, in elements as large, of order 3 at most."""

@@ -168,13 +168,15 @@ def designed(scene: fm.Scene, push: fm.Force, load: float, order: int) -> fm.Cur
     return shaped.load_displacement(push, forces=[load])
 
 
-@pytest.mark.parametrize(("order", "apart"), [(1, 1e-3), (2, 1e-6)], ids=["straight edges", "curved edges"])
-def test_errors_of_designs_are_those_of_their_shape(order, apart):
+@pytest.mark.parametrize("order", [1, 2], ids=["straight edges", "curved edges"])
+def test_errors_of_designs_are_those_of_their_shape(order):
     """The same parameters make another shape on another mesh."""
     scene, push, load = arch()
     curve, finer = (designed(scene, push, load, k) for k in (order, order + 1))
     assert np.abs(curve.frames[0].design.field).max() > 0.01
-    assert curve.in_finer_elements().displacement == pytest.approx(finer.values[0], rel=apart)
+    # smaller elements take away about what is estimated
+    fall, estimate = curve.in_finer_elements().displacement - finer.values[0], finer.error_estimates()[0]
+    assert 0.5 < fall / estimate < 2.0
     checked = curve.checked_errors()
     assert checked.checked.all()
     assert checked.errors == pytest.approx(by_finer_elements(curve, finer), rel=0.1)
@@ -189,9 +191,11 @@ def test_what_space_adds_to_designs_is_about_what_is_estimated():
     assert checked.errors == pytest.approx(curve.modelling_errors(), rel=0.3)
 
 
-def test_frames_in_finer_elements_have_all_quantities_of_these():
+def test_frames_in_finer_elements_have_all_quantities_of_these(monkeypatch):
     scene, push, load = arch()
-    own, finer = (simulated(scene, order).load_displacement(push, forces=[0.5 * load, load]) for order in (2, 3))
+    own = simulated(scene, 2).load_displacement(push, forces=[0.5 * load, load])
+    refine(monkeypatch, 1)
+    finer = simulated(scene, 3).load_displacement(push, forces=[0.5 * load, load])
     for wanted, frame in zip(finer.frames, own.frames, strict=True):
         found = own.in_finer_elements(frame)
         assert found.displacement == pytest.approx(wanted.displacement, rel=1e-8)
