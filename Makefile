@@ -104,7 +104,7 @@ random-scenes-check: install-test ## a fixed block, the hundred seeds from 10000
 	$(call heading,a hundred random scenes)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes --count 100 --seed 10000 --out "$$(mktemp -d)"
 
-effectivity: install-test ## error estimates of 300 random scenes from seed 18000 on, against finer elements and space
+effectivity: install-test ## error estimates of 300 random scenes from seed 20000 on, against finer elements and space
 	$(call heading,effectivity of error estimates)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON) -m tests.hard.random_scenes.effectivity --write
 
