@@ -28,8 +28,10 @@ the same on all processes and machines, and not by time:
                                                                equilibrium past a fold is known, or ``failures`` in
                                                                a row
     8. the nearest equilibrium found past a fold, a snap; or   one; or one solve ``snap_iterations`` times as long
-       that of a longer solve; or the nearest of those kept
-       under contact
+       that of a longer solve, where rounding hides what
+       resists for the value asked for: the forces that are
+       not in balance just past a fold are rounding; or the
+       nearest of those kept under contact
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre (``dead_centre``)                  not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -390,7 +392,7 @@ class LoadStepper(Stepper):
             return way.beyond
         longer, way.patient = not way.patient, True
         try:
-            return self._beyond_steps(control, failure, way.tried, hidden, longer=longer)
+            return self._beyond_steps(way.control if hidden else control, failure, way.tried, hidden, longer=longer)
         except LoadStepsFailed:
             ahead = [value for value in way.aside if (value - self._value) * step > 0.0]
             if not ahead:
@@ -485,16 +487,17 @@ class LoadStepper(Stepper):
         """The equilibrium that more iterations lead to from the last one, where steps end.
 
         Args:
-            control: at the value of the last step that failed.
+            control: at the value of the last step that failed; at the end of all where what resists is ``hidden``.
             failure, tried, hidden: of these steps, see ``LoadStepsFailed``.
-            longer: whether a longer solve is tried, unless ``hidden``.
+            longer: whether a longer solve is tried.
 
         Raises:
             LoadStepsFailed: there is none.
         """
         fold = self._fold(control.prescribed)
-        if longer and not hidden and self._last is not None:
-            descending = self.solver if fold is None else self.solver.turning or self.solver  # turns lead far
+        if longer and self._last is not None:
+            plain = fold is None and not hidden
+            descending = self.solver if plain else self.solver.turning or self.solver  # turns lead far
             try:
                 point = descending.patient(self._steps.snap_iterations).solve(self._last.state, control)
             except NotConverged as ended:

@@ -103,6 +103,20 @@ def test_scenes_that_ended_wrongly_once_end_in_equilibrium(seed, outcomes, frame
     assert frames in (None, result.frames), result
 
 
+@pytest.mark.thorough
+def test_a_snap_that_rounding_of_a_stiff_link_hides_ends_as_beside_a_softer_one():
+    """A coupler between two pins carries next to nothing: its stiffness moves nothing."""
+    scene = replace(random_scene(58994), space="plane-stress")
+
+    def snapped(young: float) -> fm.Frame:
+        links = tuple(replace(link, young=young) if link.name == "second coupler" else link for link in scene.links)
+        return build(replace(scene, links=links)).curve(scene).frames[-1]
+
+    soft, stiff = snapped(2e3), snapped(2e4)
+    assert soft.snapped_through and stiff.snapped_through
+    assert stiff.displacement == pytest.approx(soft.displacement, rel=1e-9)
+
+
 def test_every_seed_gives_the_same_scene_again():
     assert [random_scene(seed) for seed in range(50)] == [random_scene(seed) for seed in range(50)]
     assert len({repr(random_scene(seed)) for seed in range(50)}) == 50
