@@ -218,8 +218,8 @@ def test_estimate_finds_how_much_stiffer_the_designed_truss_is_in_space_even_pul
     part = {diagonal: fm.step_file(tmp_path / "diagonal.step", depth=20.0)}
     flat = fm.Simulation(scene, space="plane-stress", order=3, size=script.QUICK).with_shapes(part)
     deep = fm.Simulation(scene, space="3d-symmetric", order=3, size=script.QUICK, layers=1).with_shapes(part)
-    found = estimate_over_true(flat, deep, push, [0.1, 0.4])
-    assert np.all((found > 0.8) & (found < 1.25)), found
+    (found,) = estimate_over_true(flat, deep, push, [0.4])
+    assert 0.8 < found < 1.25
 
 
 @pytest.mark.parametrize("depth", [10.0, 20.0, 40.0])
