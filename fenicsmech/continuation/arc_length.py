@@ -110,10 +110,10 @@ class Finish:
     control: FollowedControl | DisplacementControl | None = None
 
     def passed(self, before: EquilibriumPoint, after: EquilibriumPoint) -> bool:
-        """Whether the end lies between two neighbouring points."""
-        a, b = self.value(before) - self.end, self.value(after) - self.end
+        """Whether the end lies between two neighbouring points, or at the second one."""
+        a, b, near = self.value(before) - self.end, self.value(after) - self.end, _AT_END * self.scale
         # a path that goes on from an end begins within the tolerance of its location
-        return abs(a) > _AT_END * self.scale and (a * b < 0.0 or b == 0.0)
+        return abs(a) > near and (a * b < 0.0 or abs(b) <= near)
 
 
 def equilibrium_at(solver: EquilibriumSolver, followed: FollowedControl, state: State) -> EquilibriumPoint:
@@ -416,6 +416,8 @@ class ArcLengthStepper(Stepper):
             if abs(gap) <= near:
                 break
             low, high = (low, distance) if (gap > 0.0) == rising else (distance, high)
+            if not low < high:  # just short of the end
+                break
             slope = finish.rate(best) / self.metric.dot(before.tangent, best.tangent)
             wanted = distance - gap / slope if slope else low
             distance = wanted if low < wanted < high else 0.5 * (low + high)

@@ -49,6 +49,15 @@ def test_an_until_without_an_end_is_refused():
         case.simulation.follow(case.push, until=12.0)
 
 
+@pytest.mark.parametrize("off", [-1e-11, 0.0, 1e-11])
+def test_a_path_ends_at_a_frame_that_is_its_end_but_for_rounding(off):
+    case = toggle.toggle(stilt_modulus=STIFF)
+    whole = case.simulation.follow(case.push, until=fm.Until(displacement=12.0)).displacements
+    end = whole[len(whole) // 2]
+    ended = case.simulation.follow(case.push, until=fm.Until(displacement=(end + 12.0 * off, 12.0)))
+    assert ended.displacements == pytest.approx(whole[: len(whole) // 2 + 1], rel=1e-9)
+
+
 def test_error_of_a_curve_that_ends_early_has_the_last_equilibrium():
     case = toggle.toggle(stilt_modulus=STIFF)
     steps = fm.ArcSteps(first=0.5, largest=0.5, smallest=0.4)
