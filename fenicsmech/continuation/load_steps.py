@@ -494,7 +494,7 @@ class LoadStepper(Stepper):
         Raises:
             LoadStepsFailed: there is none.
         """
-        fold = self._fold(control.prescribed)
+        fold = self._fold(tried[-1])
         if longer and self._last is not None:
             plain = fold is None and not hidden
             descending = self.solver if plain else self.solver.turning or self.solver  # turns lead far

@@ -40,7 +40,7 @@ from .thresholds import THRESHOLDS
 from .worker import Crashed, side_by_side
 
 FIRST, COUNT = 20_000, 300
-"""The block of scenes that the published table is of, which nothing was built on."""
+"""The block of scenes that is judged, which nothing was built on."""
 
 _UNKNOWNS = 200_000  # of finer meshes; scenes with more are left out
 _FRAMES = 60  # of a path
