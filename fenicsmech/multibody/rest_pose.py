@@ -12,7 +12,8 @@ from the same pose, where ½ (w + d)² is least.
 Some loads are far stronger than others: springs hold the assembly, constant loads turn what springs leave free, and
 the force, which starts from zero, turns what is free then. Each level is minimised along the motions N in which all
 stronger ones are flat, by Newton steps with the absolute eigenvalues of the curvature, which descend, within a trust
-region.
+region. A motion that looks flat but is not, as a minimum of fourth order, is one that the stronger loads undo: the
+region shrinks until nothing is left of it.
 """
 
 from __future__ import annotations
@@ -57,8 +58,9 @@ class RestSearch:
     Attributes:
         steps: maximum number for each level.
         radius: largest step, within which the potential is about quadratic.
-        near: size of a step at which a level is at its minimum, and distance of a prescribed displacement that counts
-            as reached. A pose that near to it stays as it is: dead centres, drawn as such, too.
+        near: size of a step, or of the region, at which a level is at its minimum, and distance of a prescribed
+            displacement that counts as reached. A pose that near to it stays as it is: dead centres, drawn as such,
+            too.
         reach: distance from the given pose beyond which loads drive the mechanism on without end.
         same: largest distance between two poses that count as one.
         balanced: resultants of loads that turn with their link, over the sizes of these loads, that count as none.
@@ -133,13 +135,14 @@ class RestSearch:
             poses = way[-1]
             step, rounding = _step(assembler, poses, motors, level)
             size = float(np.max(np.abs(step), initial=0.0))
-            if size <= self.near:
+            if min(size, radius) <= self.near:
                 return RestEnding.AT_REST
             moved = system.unknowns(poses) + system.pose_scale * step * min(1.0, radius / size)
             trial, missed = assembler.close(system.with_unknowns(poses, moved), motors)
             trial, missed = assembler.relax(trial, missed, motors)
             after = sum(potential.value(trial) for potential in level)
-            if assembler.is_closed(missed) and after <= least + rounding:
+            gone = self.distance(system, poses, trial) >= 0.5 * min(size, radius)
+            if assembler.is_closed(missed) and gone and after <= least + rounding:
                 way.append(trial)
                 least, radius = min(least, after), min(self.radius, 2.0 * radius)
                 if self.distance(system, way[0], trial) > self.reach:

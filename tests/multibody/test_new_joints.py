@@ -159,14 +159,15 @@ def test_a_force_on_the_yoke_balances_a_spring_on_the_crank(space):
     assert curve.displacements == pytest.approx(RADIUS * np.sin(turns), rel=1e-7)
 
 
-def test_a_spring_acts_along_a_slot():
-    # drawn upright: s = r (cos φ − 1), F = dV/d(r sin φ) with V = ½ k s²
+def test_a_spring_acts_along_a_slot(caplog):
+    # drawn upright: s = r (cos φ − 1), F = dV/d(r sin φ) with V = ½ k s²: of fourth order in φ, yet at rest as drawn
     m, (base, _, slider, slot) = yoke(0.25 * TURN)
     push = m.force(on=slider, at=(20, 0), direction=(-1, 0))
     stiffness, turns = 3.0, np.array([0.8])
     simulation = simulated(m, base, [fm.JointSpring(slot, stiffness)], "plane-stress")
     curve = simulation.load_displacement(push, displacements=RADIUS * np.sin(turns))
     assert curve.forces == pytest.approx(stiffness * RADIUS * (1.0 - np.cos(turns)) * np.tan(turns), rel=1e-7)
+    assert "no pose at rest" not in caplog.text
 
 
 def test_a_joint_without_planar_form_is_refused_in_the_plane():
