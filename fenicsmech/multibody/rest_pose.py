@@ -58,9 +58,9 @@ class RestSearch:
     Attributes:
         steps: maximum number for each level.
         radius: largest step, within which the potential is about quadratic.
-        near: size of a step, or of the region, at which a level is at its minimum, and distance of a prescribed
-            displacement that counts as reached. A pose that near to it stays as it is: dead centres, drawn as such,
-            too.
+        near: size of a step, or of the region in which stronger loads undo it, at which a level is at its minimum, and
+            distance of a prescribed displacement that counts as reached. A pose that near to it stays as it is: dead
+            centres, drawn as such, too.
         reach: distance from the given pose beyond which loads drive the mechanism on without end.
         same: largest distance between two poses that count as one.
         balanced: resultants of loads that turn with their link, over the sizes of these loads, that count as none.
@@ -129,20 +129,20 @@ class RestSearch:
 
         Steps may rise by rounding, each time from the least value so far: rises do not add up.
         """
-        system, radius = assembler.system, self.radius
+        system, radius, undone = assembler.system, self.radius, False
         least = sum(potential.value(way[-1]) for potential in level)
         for _ in range(self.steps):
             poses = way[-1]
             step, rounding = _step(assembler, poses, motors, level)
             size = float(np.max(np.abs(step), initial=0.0))
             if min(size, radius) <= self.near:
-                return RestEnding.AT_REST
+                return RestEnding.AT_REST if size <= self.near or undone else RestEnding.NOT_CONVERGED
             moved = system.unknowns(poses) + system.pose_scale * step * min(1.0, radius / size)
             trial, missed = assembler.close(system.with_unknowns(poses, moved), motors)
             trial, missed = assembler.relax(trial, missed, motors)
             after = sum(potential.value(trial) for potential in level)
-            gone = self.distance(system, poses, trial) >= 0.5 * min(size, radius)
-            if assembler.is_closed(missed) and gone and after <= least + rounding:
+            undone = self.distance(system, poses, trial) < 0.5 * min(size, radius)
+            if assembler.is_closed(missed) and not undone and after <= least + rounding:
                 way.append(trial)
                 least, radius = min(least, after), min(self.radius, 2.0 * radius)
                 if self.distance(system, way[0], trial) > self.reach:
