@@ -28,7 +28,7 @@ export PRTE_MCA_hwloc_default_binding_policy := none
 MPIRUN = OPENBLAS_NUM_THREADS=1 mpirun -n $(RANKS)
 heading = @printf '\n--- %s\n' '$(1)'
 
-.PHONY: help demo live live-pictures test check install install-test install-docs lint test-serial test-parallel test-thorough test-slow \
+.PHONY: help demo live live-pictures test check install install-test install-docs lint test-serial test-parallel test-thorough \
     test-debian13 test-newest demos-quick hard-cases random-scenes random-scenes-check effectivity docs bench clean
 
 help: ## list the targets
@@ -47,7 +47,7 @@ test: lint test-serial test-parallel ## style, types, layers; fast tests, quick 
 
 # Debian's newest moves by itself, so it is not part of this.
 # Every hard case is among its tests.
-check: test-thorough test-slow random-scenes-check docs test-debian13 ## everything that `make test` leaves out
+check: test-thorough random-scenes-check docs test-debian13 ## everything that `make test` leaves out
 
 # Where the packages come from elsewhere (the Debian 13 root), INSTALL= switches the installation off.
 INSTALL := yes
@@ -82,15 +82,11 @@ test-parallel: install-test ## the fast tests marked `parallel`, on two MPI rank
 	$(call heading,tests on $(RANKS) ranks)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and not thorough and $(SELECT)" $(RANK_TESTS)
 
-test-thorough: install-test ## those marked `thorough`, on ranks if they are `parallel` too
+test-thorough: install-test ## those marked `thorough` or `slow`; on ranks what is `parallel` and not slow
 	$(call heading,thorough tests)
-	$(SERIAL) -m "thorough and not parallel and $(SELECT)" $(TESTS)
+	$(SERIAL) -m "slow or (thorough and not parallel)" $(TESTS)
 	$(MPIRUN) $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "parallel and thorough and $(SELECT)" $(TESTS)
 	OPENBLAS_NUM_THREADS=1 mpirun -n 4 $(PYTHON) -m pytest --color=no -p no:cacheprovider -m "not thorough" tests/simulation/test_ranks.py
-
-test-slow: install-test ## the tests marked `slow`
-	$(call heading,slow tests)
-	$(SERIAL) -m slow $(TESTS)
 
 # Results are kept: the same command continues after an interruption.
 N := 1000

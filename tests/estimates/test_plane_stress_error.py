@@ -122,8 +122,6 @@ def test_any_number_of_ranks_estimates_the_same_of_fibres():
     ("length", "depth", "options"),
     [
         pytest.param(10.0, 1.0, {"poisson": 0.3}, id="short, narrow"),
-        pytest.param(10.0, 10.0, {"poisson": 0.3}, id="short, wide"),
-        pytest.param(30.0, 1.0, {"turn": 0.5 * pi}, id="arc, narrow"),
         pytest.param(30.0, 10.0, {"turn": 0.5 * pi}, id="arc, wide"),
         pytest.param(30.0, 10.0, {"turn": pi / 3.0, "pinned": True}, id="pinned arc"),
     ],
@@ -216,8 +214,8 @@ def test_estimate_finds_how_much_stiffer_the_designed_truss_is_in_space_even_pul
     problem.export(tmp_path, OPTIMUM)
     # of one outline: it has its full length at the last force, whose displacement that decides
     part = {diagonal: fm.step_file(tmp_path / "diagonal.step", depth=20.0)}
-    flat = fm.Simulation(scene, space="plane-stress", order=3, size=script.QUICK).with_shapes(part)
-    deep = fm.Simulation(scene, space="3d-symmetric", order=3, size=script.QUICK, layers=1).with_shapes(part)
+    flat = fm.Simulation(scene, space="plane-stress", size=script.QUICK).with_shapes(part)
+    deep = fm.Simulation(scene, space="3d-symmetric", size=script.QUICK, layers=1).with_shapes(part)
     (found,) = estimate_over_true(flat, deep, push, [0.4])
     assert 0.8 < found < 1.25
 
