@@ -27,11 +27,11 @@ the same on all processes and machines, and not by time:
     7. half the step                                           ``LoadSteps.smallest``, ``smallest_snap_step`` once an
                                                                equilibrium past a fold is known, or ``failures`` in
                                                                a row
-    8. the nearest equilibrium found past a fold, a snap; or   one; or one solve ``snap_iterations`` times as long
-       that of a longer solve, where rounding hides what
-       resists for the value asked for: the forces that are
-       not in balance just past a fold are rounding; or the
-       nearest of those kept under contact
+    8. the nearest equilibrium found past a fold, a snap; or   one; or solves ``snap_iterations`` times as long, one or
+       that of a longer solve, at last for the value asked     two
+       for, where rounding hides what resists only so: just
+       past a fold what is not in balance can be rounding; or
+       the nearest of those kept under contact
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre (``dead_centre``)                  not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -392,7 +392,7 @@ class LoadStepper(Stepper):
             return way.beyond
         longer, way.patient = not way.patient, True
         try:
-            return self._beyond_steps(way.control if hidden else control, failure, way.tried, hidden, longer=longer)
+            return self._beyond_steps((control, way.control)[hidden:], failure, way.tried, hidden, longer=longer)
         except LoadStepsFailed:
             ahead = [value for value in way.aside if (value - self._value) * step > 0.0]
             if not ahead:
@@ -482,12 +482,13 @@ class LoadStepper(Stepper):
             raise
 
     def _beyond_steps(
-        self, control: Control, failure: NotConverged, tried: Sequence[float], hidden: bool, *, longer: bool
+        self, controls: Sequence[Control], failure: NotConverged, tried: Sequence[float], hidden: bool, *, longer: bool
     ) -> EquilibriumPoint:
         """The equilibrium that more iterations lead to from the last one, where steps end.
 
         Args:
-            control: at the value of the last step that failed; at the end of all where what resists is ``hidden``.
+            controls: at the value of the last step that failed, unless what resists is ``hidden``, and of the end of all:
+                just past a fold forces that are not in balance can be rounding.
             failure, tried, hidden: of these steps, see ``LoadStepsFailed``.
             longer: whether a longer solve is tried.
 
@@ -498,13 +499,14 @@ class LoadStepper(Stepper):
         if longer and self._last is not None:
             plain = fold is None and not hidden
             descending = self.solver if plain else self.solver.turning or self.solver  # turns lead far
-            try:
-                point = descending.patient(self._steps.snap_iterations).solve(self._last.state, control)
-            except NotConverged as ended:
-                self.iterations += ended.iterations
-            else:
-                self.iterations += point.iterations
-                return point
+            for control in controls[:1] if plain else controls:
+                try:
+                    point = descending.patient(self._steps.snap_iterations).solve(self._last.state, control)
+                except NotConverged as ended:
+                    self.iterations += ended.iterations
+                else:
+                    self.iterations += point.iterations
+                    return point
         raise LoadStepsFailed(
             self._last, self._value, failure.reason, tuple(tried), fold=fold, hidden=hidden, straight=self._straight
         ) from failure
