@@ -51,8 +51,8 @@ _KEPT = MPI.Comm.Create_keyval()  # marks communicators whose duplicate is kept
 _ADD = (dolfinx.la.ScatterMode if _LEGACY else dolfinx.la.InsertMode).add
 
 # Strict IEEE arithmetic (no -ffast-math, no fused products): energies rely on cancellation-free forms and on NaN where
-# J ≤ 0. Code of FFCx, thousands of scalars in one block, gains nothing from -O2 or -O3, which compile for twice as long;
-# most of that goes into the choice of registers, hence the limit.
+# J ≤ 0. Code of FFCx, thousands of scalars in one block, gains nothing from -O2 or -O3, which compile for twice as
+# long; most of that goes into the choice of registers, hence the limit.
 _FLAGS = (
     "-O1 -march=native -ffp-contract=off -fno-math-errno -fno-trapping-math -g0 "
     "--param=lra-max-considered-reload-pseudos=10"

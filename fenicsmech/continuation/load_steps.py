@@ -28,10 +28,9 @@ the same on all processes and machines, and not by time:
                                                                equilibrium past a fold is known, or ``failures`` in
                                                                a row
     8. the nearest equilibrium found past a fold, a snap; or   one; or solves ``snap_iterations`` times as long, one or
-       that of a longer solve, at last for the value asked     two
-       for, where rounding hides what resists only so: just
-       past a fold what is not in balance can be rounding; or
-       the nearest of those kept under contact
+       that of a longer solve, or of one for the value asked   two
+       for: just past a fold what is not in balance can be
+       rounding; or the nearest of those kept under contact
     9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
        beyond a dead centre (``dead_centre``)                  not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
@@ -487,8 +486,8 @@ class LoadStepper(Stepper):
         """The equilibrium that more iterations lead to from the last one, where steps end.
 
         Args:
-            controls: at the value of the last step that failed, unless what resists is ``hidden``, and of the end of all:
-                just past a fold forces that are not in balance can be rounding.
+            controls: at the value of the last step that failed, unless what resists is ``hidden``; at the end of all,
+                as just past a fold forces that are not in balance can be rounding.
             failure, tried, hidden: of these steps, see ``LoadStepsFailed``.
             longer: whether a longer solve is tried.
 
