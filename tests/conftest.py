@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import faulthandler
-import gc
 import os
 import subprocess
 import sys
@@ -44,12 +43,6 @@ def pytest_configure(config: pytest.Config) -> None:
     if COMM.rank > 0:
         sys.stdout = open(os.devnull, "w")  # the terminal reporter, set up next, writes to what it finds here
         config.add_cleanup(sys.stdout.close)
-
-
-def pytest_collection_finish() -> None:
-    """Leave the tests themselves out of the collections of garbage, which UFL's many objects cause."""
-    gc.collect()
-    gc.freeze()
 
 
 def pytest_unconfigure() -> None:

@@ -18,7 +18,7 @@ def test_curve_that_ends_where_the_displacement_turns_back_says_where_and_names_
     fold = turned.frame.displacement
     values = [*np.linspace(0.0, fold, 30)[1:-1], 1.05 * fold]
     # iterations that suffice along the path, but not for the snap beyond its fold, which may end on another one
-    options = {"space": "plane-stress", "size": RISE / 4.0, "solver": fm.PrimalDualNewton(iterations=4)}
+    options = {"space": "plane-stress", "size": RISE / 4.0, "solver": fm.PrimalDualNewton(iterations=3)}
     ending = fm.Simulation(simulation.scene, **options)
     with pytest.raises(fm.EquilibriumError, match=r"Use follow\(\), which goes round the turn") as caught:
         ending.load_displacement(push, displacements=values)
