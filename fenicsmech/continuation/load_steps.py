@@ -391,7 +391,7 @@ class LoadStepper(Stepper):
             return way.beyond
         longer, way.patient = not way.patient, True
         try:
-            return self._beyond_steps((control, way.control)[hidden:], failure, way.tried, hidden, longer=longer)
+            return self._beyond_steps(control, way.control, failure, way.tried, hidden, longer=longer)
         except LoadStepsFailed:
             ahead = [value for value in way.aside if (value - self._value) * step > 0.0]
             if not ahead:
@@ -481,13 +481,21 @@ class LoadStepper(Stepper):
             raise
 
     def _beyond_steps(
-        self, controls: Sequence[Control], failure: NotConverged, tried: Sequence[float], hidden: bool, *, longer: bool
+        self,
+        control: Control,
+        asked: Control,
+        failure: NotConverged,
+        tried: Sequence[float],
+        hidden: bool,
+        *,
+        longer: bool,
     ) -> EquilibriumPoint:
         """The equilibrium that more iterations lead to from the last one, where steps end.
 
         Args:
-            controls: at the value of the last step that failed, unless what resists is ``hidden``; at the end of all,
-                as just past a fold forces that are not in balance can be rounding.
+            control: at the value of the last step that failed, tried unless what resists is ``hidden``.
+            asked: at the end of all steps, tried then and past a fold: just past one what is not in balance can be
+                rounding.
             failure, tried, hidden: of these steps, see ``LoadStepsFailed``.
             longer: whether a longer solve is tried.
 
@@ -498,9 +506,12 @@ class LoadStepper(Stepper):
         if longer and self._last is not None:
             plain = fold is None and not hidden
             descending = self.solver if plain else self.solver.turning or self.solver  # turns lead far
-            for control in controls[:1] if plain else controls:
+            controls = [] if hidden else [control]
+            if not plain and (hidden or asked.prescribed != control.prescribed):
+                controls.append(asked)
+            for own in controls:
                 try:
-                    point = descending.patient(self._steps.snap_iterations).solve(self._last.state, control)
+                    point = descending.patient(self._steps.snap_iterations).solve(self._last.state, own)
                 except NotConverged as ended:
                     self.iterations += ended.iterations
                 else:
