@@ -35,6 +35,10 @@ class DeadCentreStepper(LoadStepper):
                 raise
         return super().advance(control, failures=failures)
 
+    def _past_fold(self, control: Control, asked: Control) -> list[Control]:
+        """Only the nearer one: a dead centre looks like a fold, and what lies behind it is reached by its path."""
+        return [control]
+
     def _pass_dead_centre(self, last: EquilibriumPoint, tried: float, control: Control) -> bool:
         """Continues from the ``last`` equilibrium by straining links, past a dead centre before the value that was
         ``tried``; whether this succeeded."""

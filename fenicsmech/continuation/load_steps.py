@@ -506,10 +506,7 @@ class LoadStepper(Stepper):
         if longer and self._last is not None:
             plain = fold is None and not hidden
             descending = self.solver if plain else self.solver.turning or self.solver  # turns lead far
-            controls = [] if hidden else [control]
-            if not plain and (hidden or asked.prescribed != control.prescribed):
-                controls.append(asked)
-            for own in controls:
+            for own in [asked] if hidden else [control] if plain else self._past_fold(control, asked):
                 try:
                     point = descending.patient(self._steps.snap_iterations).solve(self._last.state, own)
                 except NotConverged as ended:
@@ -520,6 +517,10 @@ class LoadStepper(Stepper):
         raise LoadStepsFailed(
             self._last, self._value, failure.reason, tuple(tried), fold=fold, hidden=hidden, straight=self._straight
         ) from failure
+
+    def _past_fold(self, control: Control, asked: Control) -> list[Control]:
+        """The controls under which equilibria past a fold are looked for, in turn, see ``_beyond_steps``."""
+        return [control] if control.prescribed == asked.prescribed else [control, asked]
 
     def _shifted(self, guess: State, control: Control, brief: bool = False) -> EquilibriumPoint:
         """The equilibrium near ``guess``, with the first shift for zero-energy modes that leads there; ``brief``: with

@@ -138,10 +138,10 @@ class RestSearch:
             if min(size, radius) <= self.near:
                 return RestEnding.AT_REST if size <= self.near or undone else RestEnding.NOT_CONVERGED
             moved = system.unknowns(poses) + system.pose_scale * step * min(1.0, radius / size)
-            trial, missed = assembler.close(system.with_unknowns(poses, moved), motors)
-            trial, missed = assembler.relax(trial, missed, motors)
+            closed, missed = assembler.close(system.with_unknowns(poses, moved), motors)
+            trial, missed = assembler.relax(closed, missed, motors)
             after = sum(potential.value(trial) for potential in level)
-            undone = self.distance(system, poses, trial) < 0.5 * min(size, radius)
+            undone = self.distance(system, closed, trial) > 0.5 * min(size, radius)
             if assembler.is_closed(missed) and not undone and after <= least + rounding:
                 way.append(trial)
                 least, radius = min(least, after), min(self.radius, 2.0 * radius)
