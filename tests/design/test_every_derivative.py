@@ -102,7 +102,6 @@ def _zero(size: int) -> float | tuple[float, ...]:
         pytest.param("plane-stress", "mirrored", None, marks=pytest.mark.parallel),
         pytest.param("plane-strain", "shifted", fm.MixedFormulation(above=0.3), marks=pytest.mark.thorough),
         pytest.param("3d-symmetric", "same", None, marks=pytest.mark.thorough),
-        pytest.param("3d", "shifted", None, marks=pytest.mark.thorough),
     ],
 )
 def test_derivatives_of_all_quantities_by_all_parameters(space, shapes, formulation):

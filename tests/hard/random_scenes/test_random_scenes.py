@@ -75,17 +75,12 @@ EXACT, ROUNDED_TOO = ("equilibrium",), ("equilibrium", ROUNDED)
 @pytest.mark.parametrize(
     ("seed", "outcomes", "frames"),
     [
-        pytest.param(22969, EXACT, 2, id="weights that swing a linkage against a soft spring balance"),
         pytest.param(23269, EXACT, 6, id="path keeps spins of links while their moments may be rounding"),
         pytest.param(8747, EXACT, 2, id="curve that snapped under a push returns to the path from rest under a pull"),
         pytest.param(8634, EXACT, None, id="weight brings a spinning link to rest beside reactions of 50,000 times it"),
-        pytest.param(12893, ROUNDED_TOO, 2, id="rounding of a pressure is no imbalance beside loads of 1e-12 of it"),
         pytest.param(19308, EXACT, 2, id="weights and a spring that buckle a linkage find where it snaps to"),
         pytest.param(19089, ROUNDED_TOO, 2, id="rubber moves steel whose rounding leaves four digits of the force"),
         pytest.param(19806, EXACT, None, id="path that turns back where a link comes off a cylinder goes on"),
-        pytest.param(
-            25128, EXACT, 1, id="a spring, weights and a push balance along a motion that rounding of steel hides"
-        ),
         pytest.param(30267, EXACT, 1, id="predictions that invert elements give way to the last equilibrium"),
         pytest.param(18468, EXACT, 2, id="a force balances beside reactions of a prestrained rod 1e5 times as large"),
         pytest.param(45513, EXACT, 6, id="path of a prestrained link against a spring below rounding goes on"),
@@ -109,9 +104,9 @@ def test_a_snap_that_rounding_of_a_stiff_link_hides_ends_as_beside_a_softer_one(
         return build(replace(scene, links=links)).curve(scene).frames[-1]
 
     # rounding disturbs, and hides, more and more of what resists
-    soft, *stiff = map(snapped, (2e3, 1e4, 2e4, 2e5))
+    soft, *stiff = map(snapped, (2e3, 2e4, 2e5))
     assert soft.snapped_through and all(own.snapped_through for own in stiff)
-    assert [own.displacement for own in stiff] == pytest.approx(3 * [soft.displacement], rel=1e-9)
+    assert [own.displacement for own in stiff] == pytest.approx(2 * [soft.displacement], rel=1e-9)
 
 
 def test_every_seed_gives_the_same_scene_again():
