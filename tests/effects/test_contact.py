@@ -44,7 +44,7 @@ def test_a_cantilever_rests_on_a_plane_first_at_its_tip_and_then_farther_in(spac
         assert frame.stable
 
 
-@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric", "3d"])
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric"])
 def test_a_block_sinks_in_by_force_over_area_and_stiffness(space):
     force = 20.0
     for stiffness in (30.0, 60.0):

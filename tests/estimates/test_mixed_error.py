@@ -90,10 +90,9 @@ def test_error_of_a_quadratic_pressure_is_recovered():
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("space", ["plane-strain", pytest.param("3d-symmetric", marks=pytest.mark.thorough)])
-def test_estimate_is_the_same_on_any_number_of_processes(space):
+def test_estimate_is_the_same_on_any_number_of_processes():
     found = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
-        simulation, curve = simulated("thick cantilever", 6.0, order=2, space=space, comm=comm)
+        _, curve = simulated("thick cantilever", 6.0, order=2, comm=comm)
         found.append(curve.error_estimates()[-1])
     assert found[1] == pytest.approx(found[0], rel=1e-5)

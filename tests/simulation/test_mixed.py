@@ -82,12 +82,11 @@ def test_results_are_the_same_on_any_number_of_ranks(space):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("space", ["plane-strain", "3d"])
-def test_limit_of_incompressibility_is_approached_without_failure(space):
+def test_limit_of_incompressibility_is_approached_without_failure():
     """Newton's method needs as many iterations, and what is left of the way falls as 1 − 2ν."""
     tips, iterations = [], []
     for poisson in (0.499, 0.4999, 0.49999):
-        simulation, push = arm((fm.Material("rubber", 2.0 * (1.0 + poisson), poisson), PLASTIC), space=space)
+        simulation, push = arm((fm.Material("rubber", 2.0 * (1.0 + poisson), poisson), PLASTIC))
         curve = simulation.load_displacement(push, forces=[0.01, 0.05])
         tips.append(curve.displacements[-1])
         iterations.append(sum(frame.iterations for frame in curve.frames))
