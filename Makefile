@@ -43,7 +43,7 @@ live: install ## the live page: a mechanism to hold in your hand, on this machin
 live-pictures: install-test ## pictures of the live page in docs/static/
 	$(PYTHON) tools/live_pictures.py
 
-test: lint test-serial test-parallel ## style, types, layers; fast tests, quick demos among them, on one process; on two ranks
+test: lint test-serial test-parallel ## style, types, layers; fast tests on one process; on two ranks
 
 # Debian's newest moves by itself, so it is not part of this.
 # Every hard case is among its tests.

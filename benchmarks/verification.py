@@ -131,7 +131,7 @@ CASES = (
         "estimates/test_plane_stress_error.py::test_estimate_is_near_what_space_adds",
     ),
     Case(
-        "estimate of the error of plane stress of strips, 1 to 30 thicknesses deep, straight and curved, against space",
+        "estimate of the error of plane stress of strips, straight and curved, against space",
         "factor 2",
         "estimates/test_plane_stress_error.py::test_estimate_finds_how_much_stiffer_strips_of_all_depths_are_in_space",
     ),

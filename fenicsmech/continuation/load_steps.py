@@ -2,7 +2,7 @@
 
 An equilibrium is predicted from those before, corrected, and accepted. Steps halve when the solver fails, go most of
 the way to a fold once it is seen ahead, and double when it took few iterations; the tangent bounds their motion;
-equilibria reached are kept, and the way to another value begins at the nearest of those that were asked for. Stepping
+the way to another value begins at the nearest of the first, the last and the outermost of those asked for. Stepping
 fails once steps are small relative to the distance covered, however far the prescribed value: the softest stiffness
 falls as √(1 − p / p*) towards a limit load p*, and the last equilibrium, at p* − 2 p* / 1024 or nearer, keeps at most 5
 % of it. A step that moves a coordinate outside the range of the tangents at its ends may have snapped over a fold,
@@ -25,17 +25,17 @@ the same on all processes and machines, and not by time:
     6. steps that turn links (``equilibrium.turning``), 1 to   as these; the kind that led to the last equilibrium
        5, or those that do not; likewise                       comes first
     7. half the step                                           ``LoadSteps.smallest``, ``smallest_snap_step`` once an
-                                                               equilibrium past a fold is known, or ``failures`` in
-                                                               a row
+                                                               equilibrium past a fold is known, or one of the
+                                                               numbers of ``failures``
     8. the nearest equilibrium found past a fold, a snap; or   one; or solves ``snap_iterations`` times as long, one or
        that of a longer solve, or of one for the value asked   two
        for: just past a fold what is not in balance can be
        rounding; or the nearest of those kept under contact
-    9. of motors and constant loads: links that strain         ten halvings, or one that fails after one that did
-       beyond a dead centre (``dead_centre``)                  not; then load steps once more
+    9. of motors and constant loads: links that strain         halvings down to ``LoadSteps.smallest``, or one that
+       beyond a dead centre (``dead_centre``)                  fails after one that did not; then load steps once more
     10. of motors: the path by arc length, which load steps    ``LoadSteps.arc_steps``, or where it turns back
        may have left at a corner
-    11. of constant loads: one solve from the rigid pose in    ``RestSearch.steps``
+    11. of constant loads: solves from the rigid pose in       ``RestSearch.steps``, and a step of these
        which they balance with springs; first of all where
        these are softer than the rounding of stiff links
     12. of motors and constant loads: descent to an            seven solves, ``LoadSteps.snap_iterations`` times as

@@ -9,8 +9,8 @@ factor:
 on one branch if d₁ − d₀ is small enough, and halved if that fails. Halves that fail too mean a fold.
 
 The equilibrium y₀ of another simulation (``transfer``) is one of this simulation under additional forces, its residual
-R(y₀). These are removed in one step. The same check applies, with R(y; d₀) = R(y) − R(y₀) and so δ = K₁⁻¹ R(y₀), and a
-second one to the distance of y from y₀.
+R(y₀). These are removed in one step. The same check applies, with R(y; d₀) = R(y) − R(y₀) and so δ = K₁⁻¹ R(y₀), and
+8 |δ| as the limit; y may be no farther from y₀ than that is from the unloaded configuration.
 
 Displacements q count from the unloaded configuration y°. Where that moves with the design (a point lies on a flexible
 link, or motors strain links or wind up springs), it is an equilibrium that is followed too. A prescribed displacement

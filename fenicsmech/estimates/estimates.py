@@ -18,9 +18,9 @@ e_p of p and e_q of its adjoint q:
 
 The gradient of the linear pressure p on the rest shape, recovered as a continuous linear field G and integrated along
 the edges of each cell from its vertices, where p is most accurate, gives a quadratic p*. With w = p − ½ G · X and I w
-its interpolation at the vertices,
+its interpolation at the vertices, for p of higher degree likewise,
 
-    e_p ≈ p* − p = I w − w,
+    e_p ≈ c (p* − p) = c (I w − w),
 
 in straight cells ½ Σ λ_i λ_j (G_i − G_j) · (X_j − X_i) over the edges. Not included: with elements of order
 1, the approximation of curved outlines by polygons.
@@ -53,12 +53,11 @@ in place of β² / (60 + β²), which is up to 1.3 times as large,
 
     (1 − g) / (1 − ν² g),     g = (2/θ) (cosh θ − cos θ) / (sinh θ + sin θ),     θ⁴ = 3 (1 − ν²) β².
 
-Measured, estimate over true difference: 1.0 to 1.8 for strips of depths from 1 to 30 and lengths from 10 to 30
-thicknesses, clamped or pinned, straight or curved, bent by up to 1 rad (1.3 and more only where the difference is below
-3 %); 0.9 to 1.4 for the demos' links as drawn and as designed. Both models have to have the same outline, that of the
-exported part: a design on another mesh is a slightly different shape, whose length alone decides how far the designed
-truss can be pulled straight (0.97 to 1.05 in the part; 2.5 on meshes of its own, where the shapes differ by more than
-3D adds). Not included: motion out of the plane, and tension that flattens curled links.
+Measured, estimate over true difference: between a half and two for strips of depths from 1 to 30 and lengths from 10 to
+30 thicknesses, clamped or pinned, straight or curved, bent by up to 1 rad, and for the demos' links as drawn and as
+designed. Both models have to have the same outline, that of the exported part: a design on another mesh is a slightly
+different shape, whose length alone decides how far the designed truss can be pulled straight. Not included: motion out
+of the plane, and tension that flattens curled links.
 
 c² was measured once, see ``Calibration``. Sources: Zienkiewicz & Zhu (doi:10.1002/nme.1620240206) for the recovery,
 Oden & Prudhomme (doi:10.1016/S0898-1221(00)00317-5) for goal-oriented estimates, Oden & Vemaganti

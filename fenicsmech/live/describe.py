@@ -112,7 +112,7 @@ def _data(problem: DesignProblem) -> Project:
     return {
         "format": FORMAT,
         "name": mechanism.name,
-        "links": [_link(link, designs) for link in mechanism.links],
+        "links": [_link(link, simulation, designs) for link in mechanism.links],
         "joints": [_joint(joint) for joint in mechanism.joints],
         "motors": [{"name": own.name, "joint": own.joint.name} for own in mechanism.motors],
         "forces": [_load(own) for own in mechanism.forces],
@@ -214,14 +214,14 @@ def _simulation(simulation: Simulation) -> dict[str, Any]:
     return found
 
 
-def _link(link: Link, designs: Mapping[FlexibleLink, SplineDesign]) -> dict[str, Any]:
+def _link(link: Link, simulation: Simulation, designs: Mapping[FlexibleLink, SplineDesign]) -> dict[str, Any]:
     if not isinstance(link, FlexibleLink):
         return {"kind": "rigid", "name": link.name, "fixed": link.fixed}
     return {
         "kind": "flexible",
         "name": link.name,
-        "shape": _shape(link.name, link.shape),
-        "material": _material(link.material),
+        "shape": _shape(link.name, simulation.shapes[link]),
+        "material": _material(simulation.materials[link]),
         "design": _design(designs[link]) if link in designs else None,
     }
 

@@ -71,6 +71,26 @@ def test_the_problem_of_a_demo_is_opened_with_its_targets_and_its_curves(name):
             assert np.abs(getattr(found, own) - getattr(expected, own)).max() < 1e-9 * scale
 
 
+def test_links_have_the_shapes_and_materials_of_the_simulation():
+    mechanism, soft, stiff = fm.Mechanism("leaf spring"), fm.Material("soft", 1e3, 0.3), fm.Material("stiff", 3e3, 0.35)
+    base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
+    leaf = mechanism.flexible("leaf", fm.strip([(0, 0), (40, 0)], thickness=2.0, depth=8.0), soft)
+    mechanism.clamp(base, leaf, end="start", length=3.0)
+    mechanism.clamp(hand, leaf, end="end", length=3.0)
+    push = mechanism.force(on=hand, at=(40, 0), direction=(0, 1), name="push")
+    drawn = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=4.0, order=1)
+    bent = fm.strip([(0, 0), (20, 3), (40, 0)], thickness=3.0, depth=8.0)
+    simulation = drawn.with_shapes({leaf: bent}).with_material(soft, stiff)
+    problem = fm.DesignProblem(
+        simulation, [fm.SplineDesign(leaf, segments=2)], targets=[fm.Target(push, force=1, displacement=2)]
+    )
+    project, drawing = reopened(problem)
+    assert drawing.problem(project).simulation.materials.popitem()[1].law == stiff.law
+    expected = simulation.load_displacement(push, forces=[1.0]).displacements
+    found = drawing.simulation.compute(drawing.request(project, 0, [1.0])).displacements
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_problem_of_a_script_is_the_project_that_describes_it():
     drawn = example("truss-finger")
     finger = fm.Mechanism("truss finger")

@@ -3,7 +3,7 @@
     B_{k+1} = B_k + y yᵀ / yᵀ s − B_k s sᵀ B_k / sᵀ B_k s,     y = change of ∂(½ |r|² + f)/∂p along the step s
 
 from B_0 = diag(ℓ⁻²), scaled, with the lengths ℓ of the parameters. B approximates the expensive part alone: the
-regulariser R, whose barriers are too steep to be learnt from gradients, enters directions exactly,
+regulariser R, whose barriers are too steep to be learnt from gradients, enters directions by its own models,
 
     d = argmin ½ dᵀ B d + (Jᵀ r + ∂f/∂p)ᵀ d + R(p + d).
 

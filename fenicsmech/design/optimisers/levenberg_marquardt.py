@@ -1,7 +1,7 @@
 """Levenberg–Marquardt for least squares with a regulariser of negligible cost.
 
 Residuals r enter each step by their Jacobian J and estimates of their Hessians H from the steps so far; the regulariser
-R, barriers included, enters exactly:
+R, barriers included, enters by its own models (``regularisers``), most of them exact:
 
     s = argmin ½ |r + J s + ½ sᵀ H s|² + R(p + s) + ½ μ |s / ℓ|²,     ℓ the lengths of the parameters.
 

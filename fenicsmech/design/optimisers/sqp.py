@@ -6,11 +6,12 @@ Each step s minimises a model under linearised inequalities (``step``),
 
     ½ |r + J s + ½ sᵀ H s|² + f + ∂f/∂p s + ½ sᵀ B s + R(p + s) + ½ μ |s / ℓ|² + Σ ν_k β(c_k + C_k s),
 
-with the regulariser R exact, in B the curvature of f + λᵀ c that its gradients show (BFGS, damped as Powell proposes),
-and in H that of the residuals along the steps so far, refused ones included (``step``). Where residuals are steep and R
-is flat, the minimum lies at the end of a curved valley, along which R falls. Without H (Gauss–Newton) steps leave the
-valley and are refused until μ makes them short: the model takes R for all the curvature along the valley, where in
-truth Σ r_k H_k outweighs R. Convergence is judged by the undamped step without H, since H may be too large.
+with the regulariser R by its own models (``regularisers``), in B the curvature of f + λᵀ c that its gradients show
+(BFGS, damped as Powell proposes), and in H that of the residuals along the steps so far, refused ones included
+(``step``). Where residuals are steep and R is flat, the minimum lies at the end of a curved valley, along which R
+falls. Without H (Gauss–Newton) steps leave the valley and are refused until μ makes them short: the model takes R for
+all the curvature along the valley, where in truth Σ r_k H_k outweighs R. Convergence is judged by the undamped step
+without H, since H may be too large.
 
 A step is accepted if it lowers the merit O + Σ ν_k β(c_k) by a part of the predicted reduction; μ falls after good
 steps and grows after bad or infeasible ones. An end by short steps is a minimum only if no infeasible ones made them
@@ -23,7 +24,7 @@ trust region and Powell's rule for ν (Nocedal & Wright, Numerical Optimization,
 
 Libraries' methods (SLSQP, MMA, CCSA, trust-constr) see O as one function: they do not use residuals, take the barriers
 of R for curvature, and end or diverge at infeasible points. ``python3 -m benchmarks.constrained`` compares them on
-formulas: SLSQP needs about as many evaluations, the others two to five times as many.
+formulas and designs.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     min over d   m(p + d) + Σ ν_k β(c_k + C_k d),     β(x) = x + ½ x² where x > 0, else 0
 
-The model m holds the regulariser exactly, barriers included. Newton's method with a line search: with m's gradient g
-and Hessian H = L Lᵀ, and slacks t ≥ 0 of the inequalities, each step solves the convex quadratic program
+The model m holds the regulariser's own, barriers included (``regularisers``). Newton's method with a line search: with
+m's gradient g and Hessian H = L Lᵀ, and slacks t ≥ 0 of the inequalities, each step solves the convex quadratic program
 
     min ½ dᵀ H d + gᵀ d + Σ ν_k (t_k + ½ t_k²)   subject to   c + C d ≤ t,  0 ≤ t,
 
