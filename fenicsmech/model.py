@@ -243,7 +243,7 @@ def _mesh_options(link: FlexibleLink, linkage: Linkage, fidelity: Fidelity) -> d
     bodies = [linkage.bodies[index] for index in linkage.interfaces[link]]
     sites = [
         # a pin along z holds its link at whatever height the link is
-        InterfaceSite(body.centre[:2] if body.axis[2] == 1.0 else body.centre, body.region, body.axis, body.name)
+        InterfaceSite(body.centre[:2] if abs(body.axis[2]) == 1.0 else body.centre, body.region, body.axis, body.name)
         for body in bodies
         if body.region is not None  # interfaces have regions, rigid links none
     ]

@@ -320,9 +320,10 @@ class DesignProblem:
         optimiser, saved = optimiser or self._default_optimiser, None
         if checkpoint is not None:
             problem = fingerprint(alone.simulation, alone._own.rest, self.targets, self.regulariser, optimiser, None)
+            problem |= {"scatter": asdict(scatter), "options of the optimiser": repr(optimiser)}
 
             def saved(name: str) -> Checkpoint:
-                return Checkpoint(Path(checkpoint) / f"{name}.json", problem | {"scatter": asdict(scatter)})
+                return Checkpoint(Path(checkpoint) / f"{name}.json", problem)
 
         return Search(comm, alone, alone._own.rest, scatter, optimiser, checkpoint=saved, resume=resume).run()
 

@@ -251,7 +251,7 @@ class _Search:
                 unfinished += 1
                 continue
             law = self._accepted(found.x)
-            again = abs(found.cost - least) <= options.same * least
+            again = laws is not None and law is not None and abs(found.cost - least) <= options.same * least
             if law is not None and found.cost < least:
                 laws, least = (law, found.x), found.cost
             if again:

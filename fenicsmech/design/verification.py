@@ -74,7 +74,7 @@ def part_simulations(
     paths = {link: folder / f"{name}.step" for link, name in solid_files(links).items()}
     on_one(simulation.comm, lambda: _write(paths, meshes, depths))
     shapes = {link: step_file(path, depth=depth) for (link, path), depth in zip(paths.items(), depths, strict=True)}
-    halved = _halved(simulation, targets)
+    halved = _halved(simulation, targets, moved)
     coarse, fine = (
         simulation.with_shapes(shapes, fidelity=_finer(simulation, factor, halved), moved=moved, placed=placed)
         for factor in (1.0, finer)
@@ -101,8 +101,10 @@ def _write(paths: Mapping[FlexibleLink, Path], meshes: Sequence[LinkMesh], depth
         write_step(path, mesh, depth=depth, name=link.name)
 
 
-def _halved(simulation: Simulation, targets: Sequence[Target]) -> bool:
+def _halved(simulation: Simulation, targets: Sequence[Target], moved: Mapping[Joint, JointChange]) -> bool:
     """Whether half the depth has all that the whole one has: nothing is beside the mid-plane, or moves out of it."""
+    if any(np.any(own.shift[2:]) or np.any(own.turn[:-1]) for own in moved.values()):
+        return False
     scene = simulation.scene
     points = [part.at for part in (*scene.mechanism.forces, *scene.mechanism.outputs)]
     points += [at for target in targets for _, at, _ in target.quantity.material_points]

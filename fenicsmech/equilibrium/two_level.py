@@ -191,7 +191,8 @@ class TwoLevelSolver(LinearSolver):
             self._residual.axpy(-factor, self._image)
         if not self._iterate(solution, min(tolerance, self._options.probe)):
             return None
-        return self.inertia() if self._met or curvature <= 0.0 else self._coarse.factor.inertia()
+        probed = self._met or curvature <= 0.0 or error == 0.0  # nothing is solved for from a guess of no size
+        return self.inertia() if probed else self._coarse.factor.inertia()
 
     def _start(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
         """P K₁⁻¹ Pᵀ b and its residual."""

@@ -45,8 +45,8 @@ class PlanarMarker:
     Attributes:
         origin: displacement of its origin from where it was drawn.
         axis: unit vector, the joint's axis if that lies in the plane, else x.
-        normal: unit vector, a quarter turn from ``axis``.
-        angle: by which the body has turned.
+        normal: unit vector, a quarter turn from ``axis``, about the joint's axis if that is normal to the plane.
+        angle: by which the body has turned, about the same.
     """
 
     origin: sympy.Matrix
@@ -316,7 +316,7 @@ def _markers(dim: int):
         vectors = [rotation * triad[k, :].T for k in range(dim)]
         if dim == 2:
             axis, normal = vectors
-            return PlanarMarker(origin, axis, normal, z[2])
+            return PlanarMarker(origin, axis, normal, triad.det() * z[2])
         e1, e2, e3 = vectors
         return SpatialMarker(origin, e1, e2, e3, triad[2, :].T, (z[3], sympy.Matrix(z[4:])))
 

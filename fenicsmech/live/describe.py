@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fenicsmech.design import DEFAULT_REGULARISER, DesignProblem, DesignResult, SplineDesign, Target
+from fenicsmech.design import DEFAULT_REGULARISER, Comparison, DesignProblem, DesignResult, SplineDesign, Target
 from fenicsmech.design import Number as NumberDesigned
 from fenicsmech.effects import Gravity, JointSpring, Temperature
 from fenicsmech.elasticity import PLANE_STRESS, MixedFormulation, Quadrature
@@ -91,11 +91,13 @@ def _data(problem: DesignProblem) -> Project:
     numbers = [own for own in problem.designs if isinstance(own, NumberDesigned)]
     curves = _Curves()
     targets, requirements = list[dict[str, Any]](), list[dict[str, Any]]()
-    for target in problem.targets:
+    compared = Comparison(problem.targets, scene.units)
+    for target, usual in zip(problem.targets, compared.scales.tolist(), strict=True):
         curve = None if target.sample is None else curves.through(target.sample)
         point = _point(target)
         if curve is not None and point is not None:
-            scale = {} if target.scale is None else {"scale": target.scale}
+            given = usual if target.scale is None and not target.wanted[0] else target.scale
+            scale = {} if given is None else {"scale": given}
             targets.append({"curve": curve, **point, "weight": target.weight, **scale})
         else:
             requirements.append({"name": _words(target), "data": plain(target)})
@@ -229,8 +231,11 @@ def _link(link: Link, simulation: Simulation, designs: Mapping[FlexibleLink, Spl
 def _design(design: SplineDesign) -> dict[str, Any]:
     more = {
         "bend": None if design.bend == SplineDesign.bend else design.bend,
-        "centreline": design.centreline and np.array(design.centreline, dtype=float).tolist(),
-        "ends": design.ends and np.array(design.ends, dtype=float).tolist(),
+        **{
+            name: np.array(own, dtype=float).tolist()
+            for name, own in (("centreline", design.centreline), ("ends", design.ends))
+            if own is not None
+        },
         "ends_move": design.ends_move,
         **{name: [link.name for link in getattr(design, name)] for name in ("same", "mirrored")},
     }

@@ -126,8 +126,9 @@ class Solver:
     def problem(
         self, sort: str, project: Project, make: Callable[[Project], DesignProblem | None]
     ) -> DesignProblem | None:
-        """A problem of the present drawing, made when its curves or targets are new."""
-        key = f"{sort} {json.dumps([project['curves'], project['targets']], sort_keys=True)}"
+        """A problem of the present drawing, made when its curves, targets or requirements are new."""
+        asked = [project["curves"], project["targets"], project.get("requirements")]
+        key = f"{sort} {json.dumps(asked, sort_keys=True)}"
         if key not in self._problems:
             if len(self._problems) > 3:  # those of earlier gestures
                 self._problems.clear()

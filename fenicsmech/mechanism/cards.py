@@ -70,7 +70,7 @@ QUANTITIES: dict[str, tuple[str, Mapping[str, float]]] = {
 }
 """What a card may hold: by name the words for it, and its units in SI."""
 
-ANY_SIGN = ("yeoh_2", "yeoh_3")
+ANY_SIGN = ("yeoh_2", "yeoh_3", "expansion", "nu")
 """Figures that may be zero or below."""
 
 INCOMPRESSIBLE = 0.49
@@ -299,8 +299,8 @@ def _figure(part: str, name: str, data: Mapping[str, Any], sources: Mapping[str,
     value = finite(own, data.get("value"))
     low, high = (finite(f"{end} of {own}", data[end]) if end in data else None for end in ("low", "high"))
     signed = -value if name == "fatigue_exponent" else value
-    if (signed <= 0.0 and name not in ANY_SIGN) or (name == "nu" and value > 0.5):
-        wanted = {"fatigue_exponent": "below zero", "nu": "above 0, at most 0.5"}.get(name, "above zero")
+    if (signed <= 0.0 and name not in ANY_SIGN) or (name == "nu" and not -1.0 < value <= 0.5):
+        wanted = {"fatigue_exponent": "below zero", "nu": "above −1, at most 0.5"}.get(name, "above zero")
         raise DescriptionError(own, f"it is {value:g}", f"Give a number {wanted}")
     if (low is not None and low > value) or (high is not None and high < value):
         raise DescriptionError(own, f"{value:g} is outside its range, {low} to {high}", "Correct the range")

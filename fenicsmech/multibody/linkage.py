@@ -421,11 +421,12 @@ def _placed(
 
 
 def _triad(joint: Joint, dim: int) -> tuple[tuple[float, ...], ...]:
-    """Unit vectors of a joint as rows: in space the axis last, in the plane (axis, normal)."""
+    """Unit vectors of a joint as rows: in space the axis last, in the plane (axis, normal), left-handed about −z."""
     axis = np.array(joint.axis)
     if dim == 2:
         first = axis[:2] if joint.kind.axis_in_plane else np.array([1.0, 0.0])
-        return tuple(first), (-first[1], first[0])
+        sense = -1.0 if axis[2] < 0.0 and not joint.kind.axis_in_plane else 1.0
+        return tuple(first), (-sense * first[1], sense * first[0])
     # the coordinate direction least aligned with the axis; the plane's x for axes along z
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     e1 = helper - (helper @ axis) * axis

@@ -41,11 +41,16 @@ class JointChange:
     __rmul__ = __mul__
 
     def place(self, at: np.ndarray, triad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The changed place (dim,) and triad (dim, dim) of a joint, unit vectors as rows, from the drawn ones."""
+        """The changed places (…, d) and triad (d, d) of a joint, unit vectors as rows, from the drawn ones.
+
+        The change may be given in space or in the plane, whichever d is.
+        """
+        d = len(triad)
+        moved = at + np.append(self.shift, 0.0)[:d]
         if not np.any(self.turn):
-            return at + self.shift, triad
-        vector, dim = self.turn if len(self.turn) == 3 else np.array([0.0, 0.0, *self.turn]), len(triad)
-        return at + self.shift, triad @ Rotation.from_rotvec(vector).as_matrix()[:dim, :dim].T
+            return moved, triad
+        vector = self.turn if len(self.turn) == 3 else np.array([0.0, 0.0, *self.turn])
+        return moved, triad @ Rotation.from_rotvec(vector).as_matrix()[:d, :d].T
 
     def __add__(self, other: JointChange) -> JointChange:
         return JointChange(self.shift + other.shift, self.turn + other.turn)

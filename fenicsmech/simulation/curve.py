@@ -402,7 +402,8 @@ class Curve(FrameSeries):
         """Writes displacement, recovered stress and strain, and pressure fields of all frames as XDMF for ParaView.
 
         All are at vertices: stress of Cauchy, its von Mises stress, the nominal strain of the elastic deformation, in
-        the plane of planar models, and its largest principal value. They vanish where joints hold a link.
+        the plane of planar models, and its largest principal value. They vanish where joints hold a link. The time of
+        a frame is its force; its number where two frames have the same.
 
         Raises:
             DescriptionError: the path does not end in .xdmf.

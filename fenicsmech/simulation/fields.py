@@ -342,7 +342,9 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
         for suffix in (".h5", ".xdmf"):
             os.replace(folder / target.with_suffix(suffix).name, target.with_suffix(suffix))
 
+    # dolfinx keeps one field for each time
     forces = np.array([frame.force for frame in frames])
+    times = forces if len(np.unique(forces)) == len(forces) else np.arange(float(len(forces)))
     x, drawn = mesh.geometry.x, mesh.geometry.x.copy()
     with model.shaped(frames[0].design):
         rest = at_vertices(model, elastic.shape)
@@ -351,7 +353,7 @@ def write_xdmf(path: str | Path, model: MechanismModel, frames: Sequence[Frame])
     try:
         x[:, : elastic.model.dim] += rest
         series = {**nodal, **recovered}
-        on_all(comm, lambda: write_series(folder / target.name, mesh, series, forces, update, comm))
+        on_all(comm, lambda: write_series(folder / target.name, mesh, series, times, update, comm))
         on_one(comm, move_up)  # all have closed the file
     finally:
         x[:] = drawn

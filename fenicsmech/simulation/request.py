@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from fenicsmech.equilibrium import Control, DisplacementControl, LoadControl
-from fenicsmech.errors import DescriptionError, finite
+from fenicsmech.errors import DescriptionError, expect, finite
 from fenicsmech.mechanism import Configuration, Force, ForceGroup, Mechanism, Motor, PrescribedPart
 
 
@@ -63,6 +63,7 @@ def read_others(
     """The constant forces in addition to ``part``, if they and the configuration are of ``mechanism``."""
     others = dict(others or {})
     for other in others:
+        expect(f"other force of {part.name!r}", other, Force, "a force", "Give {force: magnitude, …}, of a group each")
         check_force(mechanism, other)
     if isinstance(part, Force | ForceGroup) and not others.keys().isdisjoint(dict(part.ratios)):
         raise DescriptionError(f"{part.name!r}", "it is to change and to be held constant", "Leave it out of others")

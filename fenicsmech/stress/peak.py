@@ -17,7 +17,7 @@ from fenicsmech.collective import from_one, gathered, on_one, scattered
 from fenicsmech.compat import cell_dofs, cell_nodes, global_dofs, original_cells, original_nodes
 from fenicsmech.effects import OneSided
 from fenicsmech.equilibrium import State
-from fenicsmech.mechanism import Effect, Material, Units
+from fenicsmech.mechanism import Effect, Force, Material, Units
 from fenicsmech.meshing import edge_corners
 from fenicsmech.model import Design, MechanismModel
 from fenicsmech.stress.drawn import SurfaceFit
@@ -39,6 +39,7 @@ class StressRecovery:
 
     def __init__(self, model: MechanismModel, options: StressOptions | None = None) -> None:
         self._model, self._options = model, options or model.stress_options or StressOptions()
+        self._kept: tuple[tuple[Force, ...], LinkSurface | None] | None = None
 
     def peaks(self, state: State, design: Design) -> SurfacePeaks:
         """The peaks of the von Mises stress at an equilibrium."""
@@ -232,9 +233,15 @@ class StressRecovery:
         mesh = self._model.mesh.mesh
         return original_cells(mesh)[: mesh.topology.index_map(mesh.topology.dim).size_local]
 
-    @cached_property
+    @property
     def surface(self) -> LinkSurface | None:
-        """The surface, on the first process; None elsewhere."""
+        """The surface, on the first process; None elsewhere. It is kept while the mechanism has the same forces."""
+        forces = tuple(self._model.mechanism.forces)
+        if self._kept is None or self._kept[0] != forces:
+            self._kept = forces, self._surface()
+        return self._kept[1]
+
+    def _surface(self) -> LinkSurface | None:
         mesh, boundaries = self._model.mesh.mesh, self._model.fields.boundaries
         cells = self.gathered(original_nodes(mesh)[cell_nodes(mesh)])
         # constraints act only where they touch

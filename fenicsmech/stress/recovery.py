@@ -246,7 +246,8 @@ class PatchRecovery:
         cells, facets = (np.diff(patch.indptr).max(initial=0) for patch in (self._cells, self._facets))
         own = self._samples
         each = m * (cells * own.points.shape[1] + facets * own.facet_points.shape[1] * dim) + (dim * m) ** 2
-        yield from np.array_split(self._order, -(-len(self._centres) * each // self._options.chunk))
+        parts = -(-len(self._centres) * each // self._options.chunk)
+        yield from np.array_split(self._order, max(min(parts, len(self._order)), 1))
 
 
 def monomials(dim: int, degree: int) -> np.ndarray:

@@ -198,7 +198,7 @@ class PlaceFinder:
         middle = np.full((1, self._dim), 1.0 / self._dim)
         self._middles, self._normals = (own[:, 0] for own in surface.geometry(nodes, surface.barycentric(middle)))
         fine = lattice(self._dim, 4)
-        self._outside = outside.geometry(nodes, outside.barycentric(fine))[0].reshape(-1, self._dim)
+        self._outside, self._outer = outside.geometry(nodes, outside.barycentric(fine))[0], link[outside.cells]
         ends = nodes[surface.cells][:, : self._dim + 1]
         self._sizes = np.linalg.norm(ends[:, 1:] - ends[:, :1], axis=2).max(axis=1)
 
@@ -234,7 +234,8 @@ class PlaceFinder:
     def _place(self, name: str, link: str, points: np.ndarray, facets: np.ndarray) -> SingularPlace:
         """The place with the thickness of the link at some facets of its surface."""
         options, sizes = self._options, self._sizes[facets]
-        inside = thicknesses(self._middles[facets], self._normals[facets], self._outside)
+        own = self._outside[self._outer == self._link[self._surface.cells[facets[0]]]]
+        inside = thicknesses(self._middles[facets], self._normals[facets], own.reshape(-1, self._dim))
         least = options.least_reach if self._dim == 2 else options.least_reach_in_space
         reach = max(options.reach * float(np.median(inside)), least * float(np.median(sizes)))
         return SingularPlace(name, link, points, reach)

@@ -108,6 +108,15 @@ def test_checkpoints_of_another_optimiser_are_refused_but_not_those_of_other_lim
     assert resumed.iterations >= 1
 
 
+@pytest.mark.thorough
+def test_a_search_with_other_limits_does_not_return_what_those_before_led_to(tmp_path):
+    problem, few = truss((0.4, 1.8)).problem(), fm.Scatter(starts=1, trial=1)
+    problem.search(few, optimiser=fm.LevenbergMarquardt(iterations=1), checkpoint=tmp_path / "search")
+    with pytest.raises(fm.DescriptionError, match="with other options of the optimiser"):
+        more = fm.LevenbergMarquardt(iterations=3)
+        problem.search(few, optimiser=more, checkpoint=tmp_path / "search", resume=True)
+
+
 @dataclass(frozen=True)
 class Pushed(fm.Effect):
     """Nothing, where a function says so."""

@@ -303,6 +303,16 @@ def test_position_is_found_at_which_a_strip_drawn_there_moves_as_wanted_and_is_e
     assert again.displacements == pytest.approx(once.displacements, rel=1e-12)
 
 
+@pytest.mark.thorough
+def test_a_position_in_space_is_verified_in_the_part():
+    sim, pin, push = prop(space="3d", size=6.0)
+    problem = fm.DesignProblem(sim, both_ways(pin)[1:], targets=[fm.Target(push, force=1.5, displacement=1.0)])
+    result = problem.optimise(optimiser=fm.LevenbergMarquardt(iterations=1), surrogate=None)
+    (target,) = problem.verify(result).targets
+    part = target.part.value + target.part.finer_elements_add
+    assert part == pytest.approx(target.corrected, rel=0.1)
+
+
 def shifted_truss() -> Case:
     """The truss finger, whose diagonal may change its shape, and whose joints at the tip may be shifted together."""
     case = truss((0.1, 2.0), (0.4, 3.2))

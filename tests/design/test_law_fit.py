@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, least_squares
 
 import fenicsmech as fm
 
@@ -58,6 +58,22 @@ def test_exact_stresses_give_back_the_law():
     fit = fm.fit_law(fm.Ogden((0.6, 0.0015, -0.012), (1.35, 4.9, -1.95), 0.45), tests, options=ONE)
     assert fit.law.parameters == pytest.approx(PUBLISHED.parameters, rel=1e-6)
     assert max(fit.relative_rms) < 1e-8
+
+
+def test_further_starts_leave_a_local_minimum_at_the_guess(monkeypatch):
+    wanted, starts = fm.Ogden((0.5,), (3.0,), 0.45), []
+    tests = [exact(wanted, "uniaxial", np.linspace(0.8, 2.0, 8))]
+
+    def trapped(residuals, start, *args, **options):
+        found = least_squares(residuals, start, *args, **options)
+        if not starts:
+            found.x, found.cost = start, 0.5 * float(np.sum(residuals(start) ** 2))
+        starts.append(start)
+        return found
+
+    monkeypatch.setattr("fenicsmech.design.law_fit.least_squares", trapped)
+    fit = fm.fit_law(fm.Ogden((0.4,), (2.5,), 0.45), tests, held=("nu",))
+    assert fit.law.parameters == pytest.approx(wanted.parameters, rel=1e-6)
 
 
 def test_yeoh_on_treloar_is_the_linear_least_squares_fit():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from mpi4py import MPI
 from scipy.interpolate import BSpline
 
 import fenicsmech as fm
@@ -90,3 +91,21 @@ def test_a_longer_arch_bends_no_more_than_can_be_made(tmp_path):
     assert 0.98 * most <= limited.corrected <= most * (1.0 + KEPT)
     exported = max(float(curvature(side).max()) for side in sides)
     assert exported <= 1.05 * most  # the file's spline swings about the circles through three of its points
+
+
+def test_limits_alone_change_a_link_until_they_hold():
+    """Nothing else is wanted; elements are as wide as the link, with one of its handles at the rim of a clamp."""
+    mechanism = fm.Mechanism("beam")
+    base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
+    shape = fm.strip([(0, 0), (20, 0)], thickness=1.0, depth=1.0)
+    beam = mechanism.flexible("beam", shape, fm.Material("plastic", 1e6, 0.3))
+    mechanism.clamp(base, beam, end="start", length=1.0)
+    mechanism.clamp(hand, beam, end="end", length=1.0)
+    push = mechanism.force(on=hand, at=(20, 0), direction=(0, 1))
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=1.0, comm=MPI.COMM_SELF)
+    drawn = simulation.load_displacement(push, forces=[0.1]).frames[-1].peak.value
+    limits = fm.limits(fm.LargestStress(), fm.Sample({push: 0.1}), at_most=0.75 * drawn)
+    result = fm.DesignProblem(simulation, [fm.SplineDesign(beam, 2, thickness=(0.5, 3.0))], targets=limits).optimise()
+    peak = simulation.with_design(result).load_displacement(push, forces=[0.1]).frames[-1].peak
+    assert result.converged
+    assert peak.value + peak.error < 0.75 * drawn * (1.0 + KEPT)

@@ -91,6 +91,17 @@ def test_links_have_the_shapes_and_materials_of_the_simulation():
     assert found == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_target_of_zero_keeps_the_scale_that_its_problem_gives_it():
+    module = import_module("demos.truss")
+    scene, push, _ = module.describe()
+    (diagonal,) = scene.mechanism.flexible_links
+    sim = fm.Simulation(scene, space="plane-stress", size=2.0 * module.QUICK, order=1)
+    targets = [fm.Target(push, force=0.1, displacement=0.0), fm.Target(push, force=0.4, displacement=9.0)]
+    project, drawing = reopened(fm.DesignProblem(sim, [fm.SplineDesign(diagonal, 3)], targets=targets))
+    assert [own["scale"] for own in project["targets"] if own["displacement"] == 0.0] == pytest.approx([0.9])
+    assert drawing.problem(project).targets[0].scale == pytest.approx(0.9)
+
+
 def test_a_problem_of_a_script_is_the_project_that_describes_it():
     drawn = example("truss-finger")
     finger = fm.Mechanism("truss finger")

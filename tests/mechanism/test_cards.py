@@ -169,6 +169,15 @@ def test_constants_of_higher_order_may_be_negative_and_are_zero_where_left_out(t
     )
 
 
+def test_fibres_may_shrink_when_warm_and_foams_widen_when_stretched(tmp_path):
+    path, figure = tmp_path / "felt.toml", '[figures.expansion]\nvalue = -0.6\nunit = "µm/(m K)"\n'
+    figure += 'test = "dilatometer"\nsource = "book"\n\n'
+    card = CARD.replace("value = 0.3", "value = -0.3").replace("[missing]", figure + "[missing]")
+    path.write_text(card, encoding="utf-8")
+    felt = fm.material(path)
+    assert (felt.law.nu, felt.expansion) == pytest.approx((-0.3, -6e-7))
+
+
 def test_silicones_break_at_the_strain_that_their_maker_gives():
     assert fm.material("Ecoflex").strength.ultimate_strain == 9.0
     assert fm.material("Dragon Skin").strength.ultimate_strain == 3.64

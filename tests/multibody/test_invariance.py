@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fenicsmech.mechanism import Mechanism
+from fenicsmech.mechanism import Configuration, Mechanism
+from fenicsmech.multibody import assemble, build_linkage
 
 from .machine import Machine
 from .planar_machines import CRANK_ROCKER, DRAWN_ANGLE, four_bar
@@ -124,3 +125,15 @@ def test_spin_without_effect_is_left_alone():
     rod = np.array([30.0, 5.0, 30.0]) / np.linalg.norm([30.0, 5.0, 30.0])
     turned = Rotation.from_quat(np.roll(there[3:], -1)).as_rotvec()
     assert abs(turned @ rod) < 0.1 * np.linalg.norm(turned)
+
+
+@EVERY_DIMENSION
+def test_a_motor_about_minus_z_turns_the_other_way(dim):
+    def pose(turn: float, axis: tuple[float, float, float]) -> np.ndarray:
+        m = Mechanism("crank")
+        base, crank = m.rigid("base", fixed=True), m.rigid("crank")
+        motor = m.motor(m.revolute(base, crank, at=(3.0, 1.0), axis=axis))
+        linkage = build_linkage(m, dim)
+        return assemble(linkage, Configuration("turned", {motor: turn})).poses[1]
+
+    assert pose(0.4, (0.0, 0.0, -1.0)) == pytest.approx(pose(-0.4, (0.0, 0.0, 1.0)), abs=1e-14)

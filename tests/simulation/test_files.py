@@ -73,6 +73,14 @@ def test_fields_are_written_as_a_time_series_over_the_force(space, shared_tmp_pa
         assert np.nanmin(distance) <= 1e-12 * abs(largest)
 
 
+def test_frames_of_a_load_that_returns_are_numbered(shared_tmp_path):
+    simulation, curve = claw("plane-stress")
+    path, first = shared_tmp_path / "loop.xdmf", float(FORCES[-1])
+    simulation.load_displacement(curve.part, forces=[first, 0.5 * first, first]).write(path)
+    COMM.Barrier()
+    assert {float(time.get("Value")) for time in ElementTree.parse(path).iter("Time")} == {0.0, 1.0, 2.0}
+
+
 def test_folders_that_cannot_be_written_are_refused_on_all_ranks(shared_tmp_path):
     _, curve = claw("plane-stress")
     if COMM.rank == 0:

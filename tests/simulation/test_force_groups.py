@@ -60,3 +60,10 @@ def test_invalid_groups_are_refused():
         simulation.load_displacement(fm.ForceGroup("both", {push: 1.0, stranger: 1.0}), forces=[1.0])
     with pytest.raises(fm.DescriptionError, match="to be held constant"):
         simulation.load_displacement(fm.ForceGroup("one", {push: 1.0}), forces=[1.0], others={push: 1.0})
+
+
+def test_a_group_among_constant_forces_is_refused():
+    scene, push, press = arm()
+    simulation = fm.Simulation(scene, space="plane-stress", size=4.0, comm=MPI.COMM_SELF)
+    with pytest.raises(fm.DescriptionError, match="is not a force"):
+        simulation.load_displacement(push, forces=[1.0], others={fm.ForceGroup("both", {push: 1.0, press: 1.0}): 0.5})

@@ -120,6 +120,16 @@ def test_forces_on_regions_load_the_surface_there_alone(region):
     assert peak.value == pytest.approx(6e-2 * (arm - peak.place[0]), rel=0.01)
 
 
+def test_a_force_that_is_added_after_a_peak_was_read_is_left_out_of_the_next():
+    beam = cantilever("plane-stress", length=20.0, poisson=0.3, size=1.0, rigid_tip=False)
+    beam.simulation.load_displacement(beam.force, forces=[1e-2]).frames[-1].peak  # noqa: B018
+    later = beam.simulation.scene.mechanism.force(on=beam.force.on, at=(10.0, 0.5), direction=(0, -1), name="later")
+    places = [place.name for place in beam.simulation.singular_places]
+    assert "point of 'later'" in places
+    place = beam.simulation.load_displacement(later, forces=[1e-2]).frames[-1].peak.place
+    assert np.linalg.norm(np.subtract(place, (10.0, 0.5))) > 0.25
+
+
 def bracket(size: float) -> tuple[fm.Simulation, fm.Frame]:
     """An L of width 2, its corner re-entrant at (2, 2), under a force along x at the end of the upright arm."""
     mechanism = fm.Mechanism("bracket")
@@ -153,6 +163,40 @@ def test_peak_in_finer_elements_leaves_out_as_much_beside_a_corner():
     finer = curve.in_finer_elements().peak
     assert np.linalg.norm(np.subtract(finer.place, (2, 2))) > reach
     assert finer.value == pytest.approx(curve.frames[0].peak.value, rel=0.02)
+
+
+@pytest.mark.parametrize("size", [1.0, 0.5])
+def test_a_link_that_lies_across_another_does_not_thin_it(size):
+    """Each is left out up to a quarter of its own thickness beside the pin that they share."""
+    mechanism = fm.Mechanism("two leaves")
+    base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
+    first, second = (
+        mechanism.flexible(name, fm.strip([(x, 0), (x + 20, 0)], thickness=4.0, depth=1.0), STEEL)
+        for name, x in (("first", 0), ("second", 20))
+    )
+    mechanism.clamp(base, first, end="start", length=2.0)
+    mechanism.revolute(first, second, at=(20, 0), interface_radius=3.0)
+    mechanism.clamp(hand, second, end="end", length=2.0)
+    simulation = fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=size, comm=MPI.COMM_SELF)
+    reaches = [place.reach for place in simulation.singular_places if "revolute" in place.name]
+    assert len(reaches) == 2 and min(reaches) == pytest.approx(1.0, rel=0.1)
+
+
+def test_the_number_of_patches_that_are_fitted_together_does_not_matter():
+    mechanism = fm.Mechanism("cantilever")
+    base, hand = mechanism.rigid("base", fixed=True), mechanism.rigid("hand")
+    beam = mechanism.flexible("beam", fm.strip([(0, 0), (10, 0)], thickness=1.0, depth=1.0), STEEL)
+    mechanism.clamp(base, beam, end="start", length=1.0)
+    mechanism.clamp(hand, beam, end="end", length=1.0)
+    push = mechanism.force(on=hand, at=(10, 0), direction=(0, 1))
+    peaks = [
+        fm.Simulation(fm.Scene(mechanism), space="plane-stress", size=1.0, stress=stress, comm=MPI.COMM_SELF)
+        .load_displacement(push, forces=[1e-2])
+        .frames[-1]
+        .peak.value
+        for stress in (fm.StressOptions(), fm.StressOptions(recovery=fm.RecoveryOptions(chunk=1)))
+    ]
+    assert peaks[1] == pytest.approx(peaks[0], rel=1e-9)
 
 
 def test_places_that_hold_the_whole_surface_are_named():

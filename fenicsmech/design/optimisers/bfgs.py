@@ -167,4 +167,5 @@ def _iterate(
 ) -> Iterate:
     """The iterate with the reduction predicted for the quasi-Newton step."""
     lowest = _model(here, curvature, here.parameters + _step(here, curvature)).value
-    return Iterate(number, evaluations, here, curvature.ravel(), (here.value - lowest) / max(here.value, 1e-30), reason)
+    size = max(here.value + abs(here.plain.value) - here.plain.value, 1e-30)  # positive whatever the sign of f
+    return Iterate(number, evaluations, here, curvature.ravel(), (here.value - lowest) / size, reason)

@@ -206,8 +206,12 @@ class SQP(Optimiser):
         return last.reason in (Reason.CONVERGED, Reason.NO_DESCENT) and last.reduction > self.least_reduction
 
     def _begin(self, here: Evaluation, lengths: np.ndarray) -> Memory:
-        """Memory at the start: O changes by the scale, and f's gradient by itself, when p changes by its lengths."""
-        scale = max(_magnitude(here, 0.0), float(np.linalg.norm(lengths * here.gradient)))
+        """Memory at the start: O changes by the scale, and f's gradient by itself, when p changes by its lengths.
+
+        Where nothing but limits is asked for, O vanishes with its gradient, and violations give the scale.
+        """
+        change = float(np.linalg.norm(lengths * here.gradient))
+        scale = max(_magnitude(here, 0.0 if here.value or change else 1.0), change)
         bend = float(np.linalg.norm(lengths * here.plain.gradient))
         penalties, curvature = _sizes(here, lengths, scale), bend * np.diag(lengths**-2)
         return Memory(self.damping, 0, scale, penalties, curvature, np.zeros((*here.jacobian.shape, len(lengths))))
