@@ -28,6 +28,9 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from fenicsmech.compat import cell_dofs, cellwise_space, compile_form
 from fenicsmech.effects.link_fields import Boundary, Faces, LinkFields, exterior_facets, find_boundaries
@@ -54,7 +57,7 @@ def region_average(
         where, within = region.where, region.within
         if where is None:
             every = exterior_facets(mesh.mesh, half=half)
-            where = _plane_of_face(part, at, every.only(mesh.link[every.cells] == number), mesh.comm)
+            where = _face_at(part, at, every.only(mesh.link[every.cells] == number), mesh.comm)
         faces = Faces(links[number], where)
         try:
             boundaries = find_boundaries(mesh.mesh, links, mesh.link, [faces], half=half)
@@ -86,10 +89,10 @@ def region_average(
     return LinkPoint(nodes, weights)
 
 
-def _plane_of_face(
+def _face_at(
     part: Force | Output, at: np.ndarray, boundary: Boundary, comm: MPI.Comm
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Predicate of the points in the plane of the flat face that ``at`` lies on."""
+    """Predicate of the vertices of the flat face that ``at`` lies on: of the facets in its plane that join there."""
     places = boundary.places
     edges, arm = places[:, 1:] - places[:, :1], at - places[:, 0]
     along = np.linalg.solve(edges @ edges.transpose(0, 2, 1), (edges @ arm[..., None]))[..., 0]
@@ -107,7 +110,16 @@ def _plane_of_face(
         raise DescriptionError(name, f"{where} is not on a flat face of link {part.on.name!r}", remedy)
     if np.any(np.abs(normals @ normals[0]) < 1.0 - 1e-8):
         raise DescriptionError(name, f"{where} is where two faces of link {part.on.name!r} meet", remedy)
-    return lambda points: np.abs((points - at) @ normals[0]) <= 1e-6 * sizes[0]
+    near, there = 1e-6 * sizes[0], np.isin(np.arange(len(places)), hit)
+    flat = (np.abs((places - at) @ normals[0]) <= near).all(axis=1)
+    gathered = comm.allgather((boundary.corners[flat], places[flat], there[flat]))
+    corners, places, there = (np.concatenate(values) for values in zip(*gathered, strict=True))
+    count, vertices = corners.max() + 1, corners.ravel()
+    facets = count + np.repeat(np.arange(len(corners)), corners.shape[1])
+    graph = coo_matrix((np.ones(len(vertices)), (vertices, facets)), shape=(count + len(corners),) * 2)
+    component = connected_components(graph, directed=False)[1][count:]
+    face = cKDTree(places[component == component[np.argmax(there)]].reshape(-1, len(at)))
+    return lambda points: face.query(points, distance_upper_bound=2.0 * near)[0] <= near
 
 
 def _indicator(

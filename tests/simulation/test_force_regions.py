@@ -99,6 +99,29 @@ def test_traction_on_the_end_face_gives_uniform_stress(space, order):
     assert stress == pytest.approx(np.full(stress.shape, force / (THICKNESS * DEPTH)), rel=1e-8)
 
 
+@pytest.mark.parallel
+@pytest.mark.parametrize("space", ["plane-stress", "3d-symmetric"])
+def test_a_face_ends_where_others_in_its_plane_begin(space):
+    """A force on the end of one prong of a fork leaves the other one alone."""
+    mechanism = fm.Mechanism("fork")
+    base = mechanism.rigid("base", fixed=True)
+    outline = [(0, 0), (30, 0), (30, 40), (20, 40), (20, 10), (10, 10), (10, 40), (0, 40)]
+    fork = mechanism.flexible("fork", fm.polygon(outline, depth=5.0), fm.Material("plastic", 1000.0, 0.3))
+    mechanism.weld(base, fork, at=(15, 4), region=fm.Rectangle(30.0, 8.0))
+    pushes = [
+        mechanism.force(on=fork, at=(5, 40), direction=(1, 0), region=region, name=f"by {name}")
+        for name, region in (
+            ("face", fm.Face()),
+            ("predicate", fm.Face(where=lambda x: (x[:, 1] > 39.9) & (x[:, 0] < 15))),
+        )
+    ]
+    other = mechanism.output(on=fork, at=(25, 40), direction=(1, 0), region=fm.Face(), name="other prong")
+    simulation = fm.Simulation(fm.Scene(mechanism), space=space, order=1, size=5.0)
+    found, expected = (simulation.load_displacement(push, forces=[1.0]) for push in pushes)
+    assert found.displacements == pytest.approx(expected.displacements, rel=1e-9)
+    assert abs(found.frames[0].outputs[other]) < 0.05 * found.displacements[0]
+
+
 def test_the_region_of_a_curved_edge_is_found_by_a_predicate():
     mechanism = fm.Mechanism("ring")
     ground = mechanism.rigid("ground", fixed=True)
