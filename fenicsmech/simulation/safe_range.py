@@ -186,6 +186,8 @@ class SafeRangeSearch:
             return SafeLimit("end of the range", rest.frame)
         sense = math.copysign(1.0, bound)
         before, last, stepper, probe = rest, rest, self._stepper(), self._probe(sense)
+        if rest.frame.snapped_through:  # on the way to rest, which is none of the force's snaps
+            stepper.frame(LoadControl(0.0))
         # the slope at rest, from the probe
         slope, farthest = (probe.u - rest.u) / abs(probe.x - rest.x), abs(probe.x - rest.x)
         for _ in range(options.frames):

@@ -73,6 +73,22 @@ def test_arch_ends_at_its_limit_point_unless_its_displacement_is_prescribed():
     assert past.reason == "end of the range" and past.displacement == pytest.approx(2.0 * RISE)
 
 
+@pytest.mark.thorough
+def test_a_snap_under_constant_loads_does_not_end_the_range():
+    simulation, push = arch()
+    strong = fm.Material("strong", law=STEEL.law, strength=fm.Strength(yield_stress=100.0))
+    simulation, mechanism = simulation.with_material(STEEL, strong), simulation.scene.mechanism
+    weight = mechanism.force(on=push.on, at=push.at[:2], direction=push.direction[:2], name="weight")
+    hung = {weight: 0.3}  # beyond the limit load
+    (rest,) = simulation.load_displacement(push, forces=[0.0], others=hung).frames
+    assert rest.snapped_through and rest.stable
+    end = simulation.safe_range(push, forces=(0.0, 100.0), others=hung).upper
+    assert end.reached
+    assert simulation.load_displacement(push, forces=[end.force], others=hung).frames[0].safety.factor == pytest.approx(
+        1.0, rel=1e-2
+    )
+
+
 @pytest.mark.parametrize("bounds", [(1.0, 2.0), (0.0, 0.0), (3.0,), "x"])
 def test_ranges_lie_on_both_sides_of_zero(bounds):
     simulation, across, _ = beam()
