@@ -214,7 +214,8 @@ class CurveErrors:
     def growth(self, kind: ElasticModel | None = None) -> np.ndarray:
         """``Curve.growth_by_halving`` in an elastic model, that of the curve by default."""
         curve, found = self._curve, self._curve.discretisation
-        growth = growth_by_halving(curve.part, found.model, found.fidelity.sizes, kind) * curve.forces
+        with found.model.shaped(curve.frames[0].design):
+            growth = growth_by_halving(curve.part, found.model, found.fidelity.sizes, kind) * curve.forces
         if curve.unknown is Unknown.DISPLACEMENT:
             return growth
         # at a given displacement the force is smaller in proportion as its displacement would be larger

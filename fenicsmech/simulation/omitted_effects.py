@@ -110,7 +110,8 @@ def explain(
     ``at`` is the equilibrium of the frame.
     """
     model = discretisation.model
-    growth = growth_by_halving(part, model, discretisation.fidelity.sizes) * frame.force
+    with model.shaped(frame.design):
+        growth = growth_by_halving(part, model, discretisation.fidelity.sizes) * frame.force
     hints = [_point_force_hint(part, growth, frame.displacement, units, options)]
     if not any(isinstance(effect, Gravity) for effect in model.effects):
         weight = options.weight

@@ -127,6 +127,7 @@ class StressRecovery:
         with model.clock.phase("stress"), self._holding(state, design):
             gradients = self.gathered(model.elastic.spatial_samples())
             nodes = self.gathered(self._nodes(model.elastic.shape.x.array))
+            materials = model.materials
 
         def find() -> tuple[LawStability, ...]:
             assert nodes is not None and gradients is not None  # on the first process
@@ -134,7 +135,7 @@ class StressRecovery:
             shares = np.column_stack([1.0 - points.sum(axis=1), points])
             places = np.einsum("qv,cvd->cqd", shares, nodes[:, : shares.shape[1]])
             links = model.mechanism.flexible_links
-            return least_stable(links, model.materials, model.mesh.link_of_cell, places, gradients)
+            return least_stable(links, materials, model.mesh.link_of_cell, places, gradients)
 
         return from_one(model.mesh.mesh.comm, find)
 

@@ -45,6 +45,16 @@ def test_each_halving_adds_as_much_as_flamant_says(space, at, along):
     assert added == pytest.approx([predicted, predicted], rel=0.05)
 
 
+def test_designed_depths_and_moduli_count():
+    block = Block()
+    (link,) = block.mechanism.flexible_links
+    simulation = fm.Simulation(fm.Scene(block.mechanism), space="plane-stress", size=5.0)
+    numbers = {fm.Depth(link): 30.0, fm.LawParameter("E", link): 500.0}
+    designed = simulation.with_design(fm.Design(np.zeros_like(simulation.model.elastic.shape.x.array), numbers))
+    drawn, found = (own.load_displacement(block.push, forces=[1.0]) for own in (simulation, designed))
+    assert found.growth_by_halving[0] == pytest.approx(drawn.growth_by_halving[0] * 10.0 / 30.0 * 1000.0 / 500.0)
+
+
 @pytest.mark.thorough
 def test_less_is_added_inside_a_link():
     block = Block(at=(30.0, 0.0))
