@@ -127,6 +127,17 @@ def test_levenberg_marquardt_refuses_objectives_that_are_not_sums_of_squares():
         minimised(FormulaProblem(Formulas((1.0,), (0.0,), (), "x1**2")), LevenbergMarquardt())
 
 
+@pytest.mark.parametrize("optimiser", [SQP(), BFGS()], ids=lambda optimiser: type(optimiser).__name__)
+def test_minima_below_zero_take_no_more_iterations_than_those_above(optimiser):
+    above, below = (
+        minimised(
+            FormulaProblem(Formulas((1.0, -0.5), (2.0, 0.0), (), f"(x1 - 2)**2 + (x1 - 2)**4 + 3*x2**2 {c}")), optimiser
+        )
+        for c in ("+ 3", "- 3")
+    )
+    assert below[-1].reason is Reason.CONVERGED and len(below) <= len(above)
+
+
 @pytest.mark.parametrize("option", ["tolerance", "violation", "damping"])
 def test_options_are_positive(option):
     with pytest.raises(DescriptionError, match=f"{option} of SQP"):
