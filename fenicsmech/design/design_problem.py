@@ -128,6 +128,11 @@ class DesignProblem:
         """Parameters of the drawn design, (parameters,): those of shapes, then of numbers, in the order given."""
         return self._own.rest.initial
 
+    @property
+    def fits_plane_stress(self) -> bool:
+        """Whether plane stress has the scene, the targets and the numbers of a problem in space."""
+        return self._own.in_plane_stress is not None
+
     def with_targets(self, targets: Sequence[Target]) -> DesignProblem:
         """The same problem with other targets; handles, weights and the last equilibria from zero load are shared.
 

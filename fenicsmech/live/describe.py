@@ -44,7 +44,6 @@ from fenicsmech.mechanism import (
     Units,
 )
 from fenicsmech.meshing import LEAST_SEGMENTS
-from fenicsmech.model import fits
 from fenicsmech.quantities import ForceMagnitude, Sample
 from fenicsmech.simulation import Simulation
 
@@ -121,7 +120,7 @@ def _data(problem: DesignProblem) -> Project:
         "effects": [_effect(own) for own in scene.effects],
         "curves": curves.found,
         "targets": targets,
-        "simulation": _simulation(simulation),
+        "simulation": _simulation(simulation, flat=problem.fits_plane_stress),
         "design": None,
         "fit": True,
         **{key: value for key, value in more.items() if value},
@@ -198,10 +197,9 @@ def _words(target: Target) -> str:
     return f"{target.name} {relation or f'{target.relation} {wanted}'}"[:400]
 
 
-def _simulation(simulation: Simulation) -> dict[str, Any]:
+def _simulation(simulation: Simulation, *, flat: bool) -> dict[str, Any]:
     fidelity = simulation.fidelity
     model, size = fidelity.model, float(min(fidelity.sizes.values()))
-    flat = model.dim == 3 and fits(simulation.scene, PLANE_STRESS)
     found = {"space": PLANE_STRESS.name if flat else model.name, "size": size, "order": fidelity.order}
     if any(own != size for own in fidelity.sizes.values()):
         found["sizes"] = {link.name: own / size for link, own in fidelity.sizes.items()}

@@ -91,6 +91,20 @@ def test_links_have_the_shapes_and_materials_of_the_simulation():
     assert found == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_problem_whose_target_is_in_space_stays_there():
+    module = import_module("demos.truss")
+    scene, push, _ = module.describe()
+    (diagonal,) = scene.mechanism.flexible_links
+    sim, sample = fm.Simulation(scene, space="3d", size=2.0 * module.QUICK, order=1), fm.Sample({push: 0.1})
+    aside = fm.Target(fm.Displacement(diagonal, at=(18, 34)), sample, equals=(1.0, -1.0, 0.0))
+    along = fm.Target(push, force=0.1, displacement=2.0)
+    spaces = [
+        reopened(fm.DesignProblem(sim, [fm.SplineDesign(diagonal, 3)], targets=targets))[0]["simulation"]["space"]
+        for targets in ([along, aside], [along])
+    ]
+    assert spaces == ["3d", "plane-stress"]
+
+
 def test_a_target_of_zero_keeps_the_scale_that_its_problem_gives_it():
     module = import_module("demos.truss")
     scene, push, _ = module.describe()
