@@ -279,8 +279,8 @@ def test_elements_too_large_for_the_handles_of_a_thin_strip_are_refused():
     push = mechanism.force(on=tip, at=(40, 60), direction=(0, -1))
     case = Case(fm.Scene(mechanism), [fm.SplineDesign(strip, 3)], [fm.Target(push, force=0.1, displacement=1.0)])
     refused(
-        lambda: case.problem(size=3.0, order=1).initial,
+        lambda: case.problem(size=5.0, order=1).initial,
         part="'strip'",
-        problem="handles move no vertex, as its elements are too large: 2 of 44",
+        problem="handles move no vertex, as its elements are too large: 2 of 42",
         remedy="smaller elements",
     )
