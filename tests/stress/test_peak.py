@@ -81,6 +81,8 @@ def test_peaks_in_space_are_those_of_closed_forms_or_fine_elements(case):
     frame, known = curve.frames[-1], case.reference("3d-symmetric", simulation)
     assert frame.peak.value == pytest.approx(known, rel=0.03)
     assert estimated_well(frame.peak, known)
+    if abs(error := frame.peak.value - known) > 1e-3 * known:  # edges of second order leave less
+        assert 0.5 < (frame.peak.value - curve.in_finer_elements().peak.value) / error < 2.0
 
 
 def test_estimated_error_falls_as_elements_shrink():
