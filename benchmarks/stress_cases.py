@@ -145,18 +145,6 @@ def winkler_bach(moment: float) -> float:
     return moment * (neutral - INNER) / (area * (centroid - neutral) * INNER)
 
 
-def draw_curved_bar() -> int:
-    """The half at x > 0."""
-    occ, y = gmsh.model.occ, 1.0 - TAB
-    places = ((INNER, y), (OUTER, y), (OUTER, 0.0), (0.0, OUTER), (0.0, INNER), (INNER, 0.0))
-    centre, *points = (occ.addPoint(*place, 0.0) for place in ((0.0, 0.0), *places))
-    edges = [
-        occ.addCircleArc(first, centre, last) if k in (2, 4) else occ.addLine(first, last)
-        for k, (first, last) in enumerate(zip(points, [*points[1:], points[0]], strict=True))
-    ]
-    return occ.addPlaneSurface([occ.addCurveLoop(edges)])
-
-
 # -- bars in tension --------------------------------------------------------------------------------------------
 
 END = 13.0

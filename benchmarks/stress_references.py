@@ -36,7 +36,7 @@ from .stress_cases import (
     holed_plate,
     notched_bar,
     slotted_plate,
-)  # fmt: skip
+)
 from .table import command
 
 HEADER = ("case", "model", "beyond", "stress", "with elements of one order less [%]")

@@ -38,10 +38,16 @@ def are_inside(polygon: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def distance_to(polygon: np.ndarray, point: np.ndarray) -> float:
     """Distance of ``point`` (2,) from the edges of ``polygon``."""
-    edge = np.roll(polygon, -1, axis=0) - polygon
-    along = np.einsum("ij,ij->i", point - polygon, edge) / np.einsum("ij,ij->i", edge, edge)
-    nearest = polygon + np.clip(along, 0.0, 1.0)[:, None] * edge
-    return float(np.linalg.norm(point - nearest, axis=1).min())
+    return distance_to_edges(polygon, np.roll(polygon, -1, axis=0), point)
+
+
+def distance_to_edges(starts: np.ndarray, ends: np.ndarray, point: np.ndarray) -> float:
+    """Distance of ``point`` (2,) from the edges between ``starts`` and ``ends``, (n, 2) each; infinite from none."""
+    edge = ends - starts
+    squares = np.maximum(np.einsum("ij,ij->i", edge, edge), np.finfo(float).tiny)  # an edge may be a point
+    along = np.einsum("ij,ij->i", point - starts, edge) / squares
+    nearest = starts + np.clip(along, 0.0, 1.0)[:, None] * edge
+    return float(np.linalg.norm(point - nearest, axis=1).min(initial=np.inf))
 
 
 def first_crossing(polygon: np.ndarray) -> np.ndarray | None:

@@ -3,8 +3,7 @@
 An equilibrium is predicted along the tangent y′ and its curvature, corrected in the plane ⟨y₁′, y₂ − y⟩ = 0 through the
 prediction y, and accepted if the path turns little enough; steps are as long as its curvature allows. The fallback is
 half the step, as long as that is not the shortest one, with plain steps and then, from there on, with those that turn
-links. A try is one solve, and one for each of the
-``bisections`` if it may go round a corner or jump.
+links. A try is one solve, and one for each of the ``bisections`` if it may go round a corner or jump.
 
 Where other points come to touch an obstacle, the stiffness jumps and the path has a corner. What tells it from a bend
 and from a jump to another branch is the step bisected towards the larger turn: a bend turns less in each half, and the

@@ -28,8 +28,6 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fenicsmech.compat import cell_dofs, cellwise_space, compile_form
@@ -37,7 +35,7 @@ from fenicsmech.effects.link_fields import Boundary, Faces, LinkFields, exterior
 from fenicsmech.elasticity import ElasticBody
 from fenicsmech.errors import DescriptionError, point_text
 from fenicsmech.mechanism import Face, FlexibleLink, Force, Output, Rectangle, Region
-from fenicsmech.meshing import MechanismMesh
+from fenicsmech.meshing import MechanismMesh, parts_of
 from fenicsmech.multibody import LinkPoint
 
 _CELLS = {2: basix.CellType.interval, 3: basix.CellType.triangle, 4: basix.CellType.tetrahedron}
@@ -114,11 +112,8 @@ def _face_at(
     flat = (np.abs((places - at) @ normals[0]) <= near).all(axis=1)
     gathered = comm.allgather((boundary.corners[flat], places[flat], there[flat]))
     corners, places, there = (np.concatenate(values) for values in zip(*gathered, strict=True))
-    count, vertices = corners.max() + 1, corners.ravel()
-    facets = count + np.repeat(np.arange(len(corners)), corners.shape[1])
-    graph = coo_matrix((np.ones(len(vertices)), (vertices, facets)), shape=(count + len(corners),) * 2)
-    component = connected_components(graph, directed=False)[1][count:]
-    face = cKDTree(places[component == component[np.argmax(there)]].reshape(-1, len(at)))
+    parts = parts_of(corners)
+    face = cKDTree(places[parts == parts[np.argmax(there)]].reshape(-1, len(at)))
     return lambda points: face.query(points, distance_upper_bound=2.0 * near)[0] <= near
 
 

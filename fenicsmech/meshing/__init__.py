@@ -45,6 +45,7 @@ from fenicsmech.meshing.link_mesh import (
     least_stretches,
     node_ends,
     on_mid_plane,
+    parts_of,
     plan_of,
     radius_ratios,
     section_of,

@@ -261,11 +261,15 @@ def count_pieces(cells: np.ndarray) -> int:
     vertices = cells.shape[1]
     facets = np.concatenate([cells[:, list(kept)] for kept in combinations(range(vertices), vertices - 1)])
     _, facet = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True)
-    cell = np.tile(np.arange(len(cells)), vertices)
-    facet = facet.reshape(-1) + len(cells)
-    total = int(facet.max()) + 1
-    graph = coo_matrix((np.ones(len(cell)), (cell, facet)), shape=(total, total))
-    return connected_components(graph, directed=False)[0]
+    return int(parts_of(facet.reshape(vertices, -1).T).max()) + 1
+
+
+def parts_of(entities: np.ndarray) -> np.ndarray:
+    """The part of each entity, (k,), from 0 on, of entities (k, n) that hang together where they share a number."""
+    known, number = np.unique(entities, return_inverse=True)
+    count, rows = len(entities), np.repeat(np.arange(len(entities)), entities.shape[1])
+    graph = coo_matrix((np.ones(len(rows)), (rows, count + number.reshape(-1))), shape=(count + len(known),) * 2)
+    return connected_components(graph, directed=False)[1][:count]
 
 
 def boundary_loops(part: str, mesh: LinkMesh) -> tuple[np.ndarray, ...]:

@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fenicsmech.errors import point_text, set_options
-from fenicsmech.meshing import CurvedEdges
+from fenicsmech.meshing import CurvedEdges, parts_of
 from fenicsmech.stress.recovery import shape_functions, shape_slopes
 
 
@@ -207,7 +205,8 @@ class PlaceFinder:
         ridges, pairs = self._ridges()
         turned = self._turns(ridges, pairs) > self._options.corner
         ridges, pairs = ridges[turned], pairs[turned]
-        for chosen in _joined(ridges) if len(ridges) else ():
+        parts = parts_of(ridges)
+        for chosen in (np.flatnonzero(parts == part) for part in np.unique(parts)):
             facets = np.unique(pairs[chosen])
             points = self._spread(self._vertices(ridges[chosen]))
             at = points[np.argmin(np.abs(points - points.mean(axis=0)).sum(axis=1))]
@@ -288,16 +287,6 @@ class PlaceFinder:
     def _spread(self, ridges: np.ndarray) -> np.ndarray:
         """Points along ridges, (k, dim − 1, dim)."""
         return np.unique((lattice(self._dim - 1, 4) @ ridges).reshape(-1, self._dim), axis=0)
-
-
-def _joined(ridges: np.ndarray) -> list[np.ndarray]:
-    """Rows of ridges (k, n) that hang together."""
-    _, vertex = np.unique(ridges, return_inverse=True)
-    rows = np.repeat(np.arange(len(ridges)), ridges.shape[1])
-    graph = coo_matrix((np.ones(len(rows)), (rows, vertex.reshape(-1))), shape=(len(ridges), int(vertex.max()) + 1))
-    together = (graph @ graph.T).tocsr()
-    count, own = connected_components(together, directed=False)
-    return [np.flatnonzero(own == k) for k in range(count)]
 
 
 def lattice(corners: int, parts: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,12 +35,13 @@ from fenicsmech.meshing import (
     LinkOutline,
     MechanismMesh,
     cell_measures,
+    edge_corners,
     edge_rows,
     image_of,
     node_ends,
     plan_of,
 )
-from fenicsmech.polygons import chord_lengths
+from fenicsmech.polygons import chord_lengths, distance_to_edges
 
 _HANDLES = 100  # along a link, at most: the memory for their weights grows with the square, and splines are smooth
 
@@ -273,6 +274,7 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
     curve = spline.evaluate(spline.initial, samples)[:, :2]
     arc = chord_lengths(curve)
     held = plan.points[plan.cells[plan.interface != FREE]][..., :2]
+    starts, ends = (held[:, corners].reshape(-1, 2) for corners in edge_corners(held.shape[1]).T)  # of held edges
 
     stops = [(float(at), site) for at, site in zip(np.flatnonzero(spline.is_joint), fit.sites, strict=True)]
     inside = np.interp([1e-6 * spacing, arc[-1] - 1e-6 * spacing], arc, samples)  # of the mesh, whatever the rounding
@@ -293,7 +295,7 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
                     f"spline of {part}", f"it leaves the link at ({where})", "Give a centreline inside the link"
                 )
             # a quarter of the spacing away from interfaces
-            clear = _distance(at, held) > 0.25 * (b - a) / parts
+            clear = distance_to_edges(starts, ends, at) > 0.25 * (b - a) / parts
             if clear and np.all(plan.interface[cells] == FREE):
                 t.append(candidate)
                 sites.append(BETWEEN)
@@ -301,15 +303,6 @@ def _place_handles(mesh: LinkMesh, fit: SplineFit, *, spacing: float, turns: Seq
         sites.append(end_site)
     site = np.array(sites)
     return LinkHandles(spline, np.array(t), site, (site != BETWEEN) & np.array(turns)[site])
-
-
-def _distance(at: np.ndarray, cells: np.ndarray) -> float:
-    """The distance of a point (2,) from the edges of cells (m, n, 2)."""
-    ends = np.concatenate([cells[:, list(pair)] for pair in combinations(range(cells.shape[1]), 2)])
-    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
-    share = np.einsum("ki,ki->k", at - start, along) / np.maximum(np.einsum("ki,ki->k", along, along), 1e-300)
-    nearest = start + np.clip(share, 0.0, 1.0)[:, None] * along
-    return float(np.linalg.norm(nearest - at, axis=1).min(initial=np.inf))
 
 
 def _mean_width(mesh: LinkMesh, length: float) -> float:
